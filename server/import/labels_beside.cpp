@@ -144,12 +144,14 @@ Naming naming_of(const Table& table, const std::vector<std::int64_t>& values) {
 }
 
 // A table lies beside images, too, and large ones name each value of a byte. So the samples must be
-// few different values, or at least lie in small regions, which hardly any neighbours of an image
-// do.
-bool could_be_labels(std::span<const std::byte> samples, const Volume& volume, std::size_t values) {
+// few different values. Otherwise the table must have the volume's name, and the samples must lie
+// in small regions, which hardly any neighbours of an image do, but for its background.
+bool could_be_labels(std::span<const std::byte> samples, const Volume& volume, std::size_t values,
+                     bool is_own) {
   constexpr std::size_t kFew = 64;
   constexpr double kSmallRegions = 0.3;
-  return values <= kFew ||
+  if (values <= kFew) return true;
+  return is_own &&
          volume::share_of_equal_neighbours(samples, volume.type, volume.dims) >= kSmallRegions;
 }
 
@@ -160,12 +162,18 @@ void convert(std::span<const std::byte> samples, SampleType type, const ImportTa
   std::filesystem::remove(task.target);
   CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
   volume::store_whole(samples, stored, type, writer.samples().data());
+  // Samples that are no numbers have a value by now, which the first suggestion left out.
+  const std::string_view left_out = describe(NoteCode::kNonFiniteSamples).name;
+  const bool keeps_iso =
+      std::ranges::find(volume.notes, left_out, &Note::code) != volume.notes.end();
+  const double iso = volume.suggested_iso;
   volume = finish(writer, std::move(volume));
+  if (keeps_iso) volume.suggested_iso = iso;
 }
 
 // Makes labels of the volume in the task's target if its samples could be those that the table
 // names: whole numbers, none negative, most of them named. Adds a note then. Returns false if not.
-bool become_labels(const Table& table, const ImportTask& task, Volume& volume) {
+bool become_labels(const Table& table, bool is_own, const ImportTask& task, Volume& volume) {
   const volume::CanonicalVolume canonical(task.target);
   const std::span<const std::byte> samples = canonical.samples();
   const auto numbers = volume::whole_numbers(samples, volume.type);
@@ -173,7 +181,7 @@ bool become_labels(const Table& table, const ImportTask& task, Volume& volume) {
   const auto values = volume::distinct_values(samples, volume.type, Volume::kMostLabels + 1);
   if (!values) return false;
   const Naming naming = naming_of(table, *values);
-  if (!naming.is_most() || !could_be_labels(samples, volume, values->size())) return false;
+  if (!naming.is_most() || !could_be_labels(samples, volume, values->size(), is_own)) return false;
   std::string detail = "A table of names is beside the file, and it names " + naming.text() +
                        ". So the samples were read as labels.";
   if (!is_integer(volume.type)) {
@@ -187,12 +195,31 @@ bool become_labels(const Table& table, const ImportTask& task, Volume& volume) {
   return true;
 }
 
-// The values of a volume that looks like labels.
+// The labels of a volume that has some, or looks like them.
 Naming naming_in(const Table& table, const ImportTask& task, const Volume& volume) {
+  if (!volume.labels.empty()) {
+    std::vector<std::int64_t> labels;
+    for (const LabelEntry& entry : volume.labels) labels.push_back(entry.label);
+    return naming_of(table, labels);
+  }
   const volume::CanonicalVolume canonical(task.target);
   const auto values =
       volume::distinct_values(canonical.samples(), volume.type, Volume::kMostLabels + 1);
   return values ? naming_of(table, *values) : Naming{};
+}
+
+// Labels that the volume has keep their values and their own colours.
+void take_names(std::vector<LabelEntry> named, std::vector<LabelEntry>& labels) {
+  if (labels.empty()) {
+    labels = std::move(named);
+    return;
+  }
+  for (LabelEntry& entry : labels) {
+    const auto found = std::ranges::lower_bound(named, entry.label, {}, &LabelEntry::label);
+    if (found == named.end() || found->label != entry.label) continue;
+    entry.name = found->name;
+    if (!entry.color) entry.color = found->color;
+  }
 }
 
 }  // namespace
@@ -200,7 +227,8 @@ Naming naming_in(const Table& table, const ImportTask& task, const Volume& volum
 bool is_label_table(const std::filesystem::path& path) { return !labels_of(path).empty(); }
 
 void take_labels_beside(const Companions& companions, const ImportTask& task, Volume& volume) {
-  if (!volume.labels.empty()) return;
+  const auto has_name = [](const LabelEntry& entry) { return !entry.name.empty(); };
+  if (std::ranges::any_of(volume.labels, has_name)) return;
   std::vector<Table> tables = tables_beside(companions);
   if (tables.empty()) return;
   if (tables.size() > 1) {
@@ -213,7 +241,8 @@ void take_labels_beside(const Companions& companions, const ImportTask& task, Vo
   }
   Table& table = tables.front();
   if (labels_note_of(volume) == volume.notes.end()) {
-    if (!become_labels(table, task, volume)) return;
+    const bool is_own = begins_with(table.name, stem_of(companions.name()));
+    if (!become_labels(table, is_own, task, volume)) return;
   } else if (!naming_in(table, task, volume).is_any()) {
     labels_note_of(volume)->detail +=
         " The table " + in_quotes(table.name) + " names none of the labels, so it was not used.";
@@ -221,7 +250,7 @@ void take_labels_beside(const Companions& companions, const ImportTask& task, Vo
   }
   labels_note_of(volume)->detail +=
       " The names of the labels are from " + in_quotes(table.name) + '.';
-  volume.labels = std::move(table.labels);
+  take_names(std::move(table.labels), volume.labels);
 }
 
 }  // namespace isomesh::import

@@ -309,10 +309,12 @@ void ignore(const Contents& contents, Volume& volume) {
     volume.ignored.push_back(
         {printable(base_of(other.name)), "its name is not one of the numbered images beside it"});
   }
+  const auto has_name = [](const LabelEntry& entry) { return !entry.name.empty(); };
+  const bool has_names = std::ranges::any_of(volume.labels, has_name);
   for (const ArchiveMember& other : contents.others) {
     if (volume.ignored.size() >= kMostNamed) return;
     const bool is_table = is_label_table(other.path);
-    if (is_table && !volume.labels.empty()) continue;
+    if (is_table && has_names) continue;
     volume.ignored.push_back({printable(base_of(other.name)),
                               is_table ? "its names of labels were not used for this volume"
                                        : "it is not a volume in a supported format"});

@@ -1,6 +1,8 @@
 #include "server/import/dicom/import.h"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -85,7 +87,7 @@ void read_slice(const Stack& stack, std::size_t place, OpenFile& file, std::span
              stored, see);
 }
 
-bool have_same_samples(const Slice& one, const Slice& other, OpenFile& file) {
+bool have_same_samples(const Slice& one, const Slice& other, OpenFile& file, OpenFile& other_file) {
   const Rescale& rescale = one.frame->rescale;
   const Rescale& its = other.frame->rescale;
   if (one.image->layout != other.image->layout || rescale.slope != its.slope ||
@@ -95,14 +97,17 @@ bool have_same_samples(const Slice& one, const Slice& other, OpenFile& file) {
   std::vector<std::byte> samples(one.image->layout.frame_bytes());
   std::vector<std::byte> others(samples.size());
   read_slice(one, place_of(one), file, samples);
-  read_slice(other, place_of(other), file, others);
+  read_slice(other, place_of(other), other_file, others);
   return samples == others;
 }
 
-Stack stack_of(std::span<const Source> sources, OpenFile& file, const ImportOptions& options,
-               std::vector<Note>& notes) {
+Stack stack_of(std::span<const Source> sources, const ImportTask& task,
+               const ImportOptions& options, std::vector<Note>& notes) {
+  // Two, because the slices of two files may be compared in turns.
+  OpenFile file(sources, task.scratch, task.limits.max_sample_bytes);
+  OpenFile other_file(sources, task.scratch, task.limits.max_sample_bytes);
   const auto same_samples = [&](const Slice& one, const Slice& other) {
-    return have_same_samples(one, other, file);
+    return have_same_samples(one, other, file, other_file);
   };
   return choose_stack(slices_of(sources), same_samples, options, notes);
 }
@@ -237,27 +242,36 @@ DicomIdentity identify(const Stack& stack, std::span<const Source> sources, cons
   return identity;
 }
 
-// The grid of the images that a structure set belongs to; empty if there are none.
+bool is_on_geometry(const Note& note) {
+  return std::ranges::any_of(
+      std::array{NoteCode::kPositionsRounded, NoteCode::kDirectionsCorrected,
+                 NoteCode::kDistanceAssumed, NoteCode::kFrameOfReference, NoteCode::kSpaceAssumed},
+      [&](NoteCode code) { return note.code == describe(code).name; });
+}
+
+// The grid of the images that a structure set belongs to; empty if there are none. Adds the notes
+// on its geometry.
 std::optional<ContourGrid> grid_beside(const StructureFile& structures,
-                                       const std::vector<Source>& all, const ImportTask& task) {
+                                       const std::vector<Source>& all, const ImportTask& task,
+                                       std::vector<Note>& geometry_notes) {
   ImportOptions options = task.options;
   const std::vector<Source> sources = images_of(structures, all);
   if (sources.empty() || options.spacing) return std::nullopt;
   // Several volumes of one series have the same grid, and `volume` selects a structure here.
   options.volume.reset();
-  std::vector<Note> notes;
-  OpenFile file(sources, task.scratch, task.limits.max_sample_bytes);
-
-  const auto grid_of = [](const Stack& stack) {
+  const auto grid = [&] {
+    std::vector<Note> notes;
+    const Stack stack = stack_of(sources, task, options, notes);
+    std::ranges::copy_if(notes, std::back_inserter(geometry_notes), is_on_geometry);
     const PixelLayout& layout = stack.slices.front().image->layout;
     return ContourGrid{{layout.columns, layout.rows, stack.depth()}, stack.geometry};
   };
   try {
-    return grid_of(stack_of(sources, file, options, notes));
+    return grid();
   } catch (const Error& error) {
     if (error.remedy().choices.empty()) throw;
     options.volume = 0;
-    return grid_of(stack_of(sources, file, options, notes));
+    return grid();
   }
 }
 
@@ -270,8 +284,10 @@ Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;
   dicom::Upload upload = dicom::read_headers(files, task.scratch, most_sample_bytes);
   if (const auto* structures = chosen_structures(upload, task.options.series)) {
-    Volume volume = import_structures(structures->file.path,
-                                      dicom::grid_beside(*structures, upload.sources, task), task);
+    std::vector<Note> notes;
+    const auto grid = dicom::grid_beside(*structures, upload.sources, task, notes);
+    Volume volume = import_structures(structures->file.path, grid, task);
+    for (Note& note : notes) dicom::add_note(std::move(note), volume);
     volume.ignored = std::move(upload.ignored);
     return volume;
   }
@@ -279,7 +295,7 @@ Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
       choose_series(std::move(upload.sources), task.options.series);
   std::vector<Note> notes = std::move(upload.notes);
   dicom::OpenFile file(sources, task.scratch, most_sample_bytes);
-  const dicom::Stack stack = dicom::stack_of(sources, file, task.options, notes);
+  const dicom::Stack stack = dicom::stack_of(sources, task, task.options, notes);
   dicom::ignore_left_out(stack, sources, upload);
   Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
   dicom::suggest(stack, volume);

@@ -169,10 +169,16 @@ void add_notes(const StructureSet& set, const Drawing& drawing, Volume& volume) 
     volume.notes.push_back(note_of(NoteCode::kContoursSkipped, "Not drawn: " + skipped + '.'));
   }
   if (const std::size_t count = drawing.sum(&Painter::interpolated); count > 0) {
-    volume.notes.push_back(note_of(NoteCode::kContoursInterpolated,
-                                   "The shapes of structures in slices without contours were "
-                                   "interpolated between neighbouring contours, " +
-                                       count_of(count, "time") + "."));
+    std::string detail =
+        "The shapes of structures in slices without contours were interpolated between "
+        "neighbouring contours, " +
+        count_of(count, "time") + '.';
+    if (const std::size_t shifted = drawing.sum(&Painter::is_shifted); shifted > 0) {
+      detail += " The ends of " + count_of(shifted, "structure") +
+                " lie on slices, of which only the one at the lower end belongs to the structure. "
+                "So its place is half a slice towards the first slice.";
+    }
+    volume.notes.push_back(note_of(NoteCode::kContoursInterpolated, std::move(detail)));
   }
 }
 

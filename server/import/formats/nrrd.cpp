@@ -236,8 +236,7 @@ SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
   // Layers are consecutive or take turns with each sample.
   const bool is_interleaved = sizes.run == 1;
   const bool is_consecutive = sizes.run >= volume.sample_count();
-  volume.is_segmentation = has_cropped_segments(fields) && sizes.lattice.size() >= 3 &&
-                           is_integer(canonical_type(volume.layout));
+  volume.is_segmentation = has_cropped_segments(fields) && sizes.lattice.size() >= 3;
   const bool is_layered = (is_interleaved || is_consecutive) && sizes.volumes > 1 &&
                           !options.volume && has_segments(fields) &&
                           is_integer(canonical_type(volume.layout));

@@ -40,7 +40,8 @@ class Pages {
     source.dims = described_.dims;
     source.layout.type = described_.layout.type;
     source.chosen = {};
-    source.labels = palettes_.labels();
+    // A calibration makes other values of the indices.
+    if (!source.layout.rescale) source.labels = palettes_.labels();
     source.labels_if_flat = true;
     if (!palettes_.replaces()) return write_canonical(InputFile(samples_.path()), source, task_);
     ScratchFile greys(task_.scratch, ".greys");

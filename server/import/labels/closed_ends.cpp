@@ -100,6 +100,9 @@ void close_ends(CanonicalWriter& writer, Volume& volume) {
     const Vector3 step = step_of(volume.geometry, axis);
     for (std::size_t row = 0; row < 3; ++row) volume.geometry.origin[row] -= step[row];
   }
+  if (const auto fault = find_fault(volume.dims, volume.geometry)) {
+    throw_unusable("The segmentation cannot be closed at its ends: " + fault->message + ".");
+  }
   const volume::CanonicalHeader header = {volume.dims, volume.type, volume.geometry};
   if (planes > 0) {
     move_rows(writer.samples().first(header.sample_bytes()), before, volume.dims, sides, sample);

@@ -20,7 +20,7 @@ std::array<std::uint32_t, 3> with_room(const std::array<std::uint32_t, 3>& dims,
 //
 // `writer` was made for with_room(), and begins with the samples of `volume.dims`. Sets
 // dims and origin of `volume`, shortens the file to them, and adds to the note on empty planes.
-// Throws Error kInternal.
+// Throws Error kUnusableVolume if the grown geometry is not valid, kInternal.
 void close_ends(CanonicalWriter& writer, Volume& volume);
 
 }  // namespace isomesh::import

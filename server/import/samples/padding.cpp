@@ -74,6 +74,7 @@ auto with_samples(std::span<std::byte> bytes, SampleType type, const Use& use) {
 }
 
 bool look_like_labels(std::span<const std::byte> samples, const Volume& volume) {
+  if (!is_integer(volume.type) && !volume::whole_numbers(samples, volume.type)) return false;
   return volume::label_count(samples, volume.type, volume.dims) ||
          volume::mask_value(samples, volume.type, volume::measure(samples, volume.type).range);
 }
@@ -95,10 +96,12 @@ std::uint64_t leave_out_padding(const SampleSet& padding, const ImportOptions& o
   const ImageSamples image =
       with_samples(samples, volume.type, [&](auto typed) { return scan(padding, typed); });
   if (!std::isfinite(image.smallest)) {
-    throw_overridable(NoteCode::kPadding,
-                      "All samples have the padding value of the file, so it holds no image." +
-                          begin_remedy(options, "Add") +
-                          "accept=padding to read them as samples like others.");
+    throw_overridable(
+        NoteCode::kPadding,
+        (count == volume.sample_count() ? "All samples have the padding value of the file"
+                                        : what + ", and the others are not finite numbers") +
+            ", so it holds no image." + begin_remedy(options, "Add") +
+            "accept=padding to read them as samples like others.");
   }
   if (image.is_padding_zero && image.smallest > 0 && look_like_labels(samples, volume)) return 0;
   with_samples(samples, volume.type, [&](auto typed) { replace(padding, image.smallest, typed); });

@@ -113,7 +113,9 @@ bool store_whole_numbers(const SampleKind& kind, std::span<std::byte> samples, V
 // A palette colours pictures, too. These have many colours.
 bool may_be_labels(std::span<const std::byte> samples, const Volume& volume) {
   constexpr std::size_t kFew = 16;
-  return volume.labels.size() <= kFew || volume::label_count(samples, volume.type, volume.dims);
+  if (volume.labels.size() <= kFew) return true;
+  if (!is_integer(volume.type) && !volume::whole_numbers(samples, volume.type)) return false;
+  return volume::label_count(samples, volume.type, volume.dims).has_value();
 }
 
 auto find_labels_note(Volume& volume) {
@@ -147,16 +149,21 @@ Note mask_note(std::int64_t value) {
 // labels.
 void note_labels(std::span<const std::byte> samples, Volume& volume) {
   if (!is_integer(volume.type)) return;
-  const std::size_t told = volume.labels.size();
+  const auto is_told = [](const LabelEntry& entry) { return !entry.name.empty() || entry.color; };
+  const auto told = static_cast<std::size_t>(std::ranges::count_if(volume.labels, is_told));
+  const bool are_known = !volume.labels.empty();  // maybe without being told, like wide labels
   const auto mask =
-      told > 0 ? std::nullopt : volume::mask_value(samples, volume.type, volume.range);
+      are_known ? std::nullopt : volume::mask_value(samples, volume.type, volume.range);
   if (mask) return volume.notes.push_back(mask_note(*mask));
-  const auto values = volume::label_count(samples, volume.type, volume.dims);
-  if (told == 0 && !values) return;
+  const auto values = are_known ? std::optional(volume.labels.size())
+                                : volume::label_count(samples, volume.type, volume.dims);
+  if (!values) return;
   const std::string what =
       told > 0 ? "The file describes " + std::to_string(told) + (told == 1 ? " label" : " labels")
-               : "The samples look like labels: they have " + std::to_string(*values) +
-                     " different whole values in flat regions";
+      : are_known ? "The samples have " + std::to_string(*values) +
+                        (*values == 1 ? " label" : " labels") + " without a name"
+                  : "The samples look like labels: they have " + std::to_string(*values) +
+                        " different whole values in flat regions";
   volume.notes.push_back(labels_note(what));
 }
 
@@ -297,7 +304,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
 }  // namespace
 
 Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task) {
-  if (auto labels = write_wide_labels(samples, volume, task.target)) return *std::move(labels);
+  if (auto labels = write_wide_labels(samples, volume, task)) return *std::move(labels);
   volume.type = canonical_type(samples.layout);
   const auto dims =
       samples.is_segmentation ? with_room(volume.dims, volume.type, task.limits) : volume.dims;
@@ -357,9 +364,10 @@ Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
   const std::string stored =
       kind.are_wide ? "64-bit integers" : std::string(to_string(volume.type));
   const bool is_converted = store_whole_numbers(kind, samples, volume);
-  if (kind.is_segmentation) {
+  const bool is_closed = kind.is_segmentation && is_integer(volume.type);
+  if (is_closed) {
     close_ends(writer, volume);
-  } else if (is_converted) {
+  } else if (kind.is_segmentation || is_converted) {
     writer.shorten({volume.dims, volume.type, volume.geometry});
   }
   if (kind.is_segmentation || is_converted) {

@@ -36,7 +36,8 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
 struct SampleKind {
   bool are_labels = false;  // by their header
   bool are_wide = false;    // stored as integers of 64 bits
-  // The ends are closed: the file was made with_room() (labels/closed_ends.h).
+  // The ends are closed, if the samples are integers: the file was made with_room()
+  // (labels/closed_ends.h).
   bool is_segmentation = false;
   // Samples that are not part of the image, to which the caller gave the smallest sample's value.
   std::uint64_t left_out = 0;

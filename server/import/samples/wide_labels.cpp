@@ -6,12 +6,11 @@
 #include <limits>
 #include <span>
 #include <string>
-#include <type_traits>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "proto/samples.h"
+#include "server/import/labels/closed_ends.h"
 #include "server/volume/canonical.h"
 
 namespace isomesh::import {
@@ -39,60 +38,85 @@ void for_each_piece(const PlainSamples& samples, std::uint64_t count, const Take
   }
 }
 
+// The range of samples, and how flat their regions are.
 template <class Stored>
-bool is_wide(Stored value) {
-  if constexpr (std::is_signed_v<Stored>) {
-    if (value < std::numeric_limits<std::int32_t>::min()) return true;
-  }
-  return value > Stored{std::numeric_limits<std::uint32_t>::max()};
-}
+struct Survey {
+  Stored least = std::numeric_limits<Stored>::max();
+  Stored most = std::numeric_limits<Stored>::min();
+  Stored last = 0;
+  std::uint64_t pairs = 0;  // of neighbours that are not both background
+  std::uint64_t same = 0;
 
-// The values of samples, until they are too many to be labels, and how flat their regions are.
+  void take(std::span<const Stored> piece) {
+    for (const Stored value : piece) {
+      least = std::min(least, value);
+      most = std::max(most, value);
+      const bool is_same = value == last;
+      pairs += is_same && value == 0 ? 0 : 1;
+      same += is_same && value != 0 ? 1 : 0;
+      last = value;
+    }
+  }
+
+  // No type of 32 bits has all samples.
+  bool is_wide() const {
+    const auto fits = [&]<class Narrow>(Narrow) {
+      return std::in_range<Narrow>(least) && std::in_range<Narrow>(most);
+    };
+    return !fits(std::int32_t{}) && !fits(std::uint32_t{});
+  }
+  bool is_flat() const { return static_cast<double>(same) >= kFlat * static_cast<double>(pairs); }
+};
+
+// The different values other than 0, ascending, until they are too many to be labels. They are
+// sorted, because a hash table would be slow for values that its hash puts into one place.
 template <class Stored>
-class Survey {
+class Values {
  public:
   bool take(std::span<const Stored> piece) {
     for (const Stored value : piece) {
-      if (is_begun_ && value == last_) {
-        pairs_ += value == 0 ? 0 : 1;
-        same_ += value == 0 ? 0 : 1;
-        continue;
-      }
-      pairs_ += is_begun_ ? 1 : 0;
-      is_begun_ = true;
-      last_ = value;
-      has_wide_ = has_wide_ || is_wide(value);
-      if (value != 0) numbers_.try_emplace(value, 0);
-      if (numbers_.size() > Volume::kMostLabels) return false;
+      if (value == 0 || (!values_.empty() && value == values_.back())) continue;
+      values_.push_back(value);
+      if (values_.size() >= kMostUnsorted && !sort()) return false;
     }
     return true;
   }
 
-  bool may_be_labels() const { return has_wide_ && numbers_.size() <= Volume::kMostLabels; }
-  bool is_flat() const { return static_cast<double>(same_) >= kFlat * static_cast<double>(pairs_); }
-
-  // The values in ascending order, each with its number from then on.
-  std::vector<Stored> number_values() {
-    std::vector<Stored> values;
-    for (const auto& [value, number] : numbers_) values.push_back(value);
-    std::ranges::sort(values);
-    for (std::size_t at = 0; at < values.size(); ++at) {
-      numbers_[values[at]] = static_cast<std::uint32_t>(at + 1);
-    }
-    return values;
+  // Returns false if there are too many.
+  bool sort() {
+    std::ranges::sort(values_);
+    const auto rest = std::ranges::unique(values_);
+    values_.erase(rest.begin(), rest.end());
+    return values_.size() <= Volume::kMostLabels;
   }
 
-  std::uint32_t number_of(Stored value) const {
-    return value == 0 ? 0 : numbers_.find(value)->second;
+  const std::vector<Stored>& all() const { return values_; }
+
+ private:
+  static constexpr std::size_t kMostUnsorted = std::size_t{8} * Volume::kMostLabels;
+
+  std::vector<Stored> values_;
+};
+
+// The numbers of values: their places among `values`, from 1.
+template <class Stored>
+class Numbers {
+ public:
+  explicit Numbers(const std::vector<Stored>& values) : values_(values) {}
+
+  std::uint32_t of(Stored value) {
+    if (value != last_) {
+      last_ = value;
+      const auto place = std::ranges::lower_bound(values_, value);
+      number_ = value == 0 ? 0 : static_cast<std::uint32_t>(place - values_.begin()) + 1;
+    }
+    return number_;
   }
 
  private:
-  std::unordered_map<Stored, std::uint32_t> numbers_;
+  const std::vector<Stored>& values_;
   Stored last_ = 0;
-  bool is_begun_ = false;
-  bool has_wide_ = false;
-  std::uint64_t pairs_ = 0;  // of neighbours that are not both background
-  std::uint64_t same_ = 0;
+  std::uint32_t number_ = 0;
 };
 
 // Keeps what the volume's table says of labels that there are.
@@ -120,15 +144,50 @@ Note renumbered_note(std::size_t labels) {
                      "the labels of the file.");
 }
 
+[[noreturn]] void throw_too_many() {
+  throw_unusable(
+      "The file says that its samples are labels. They are integers of 64 bits, of which "
+      "at most " +
+      std::to_string(Volume::kMostLabels) +
+      " can be numbered anew, but the file has more. Number the labels anew, so that "
+      "they fit into 32 bits, or cut the volume into parts with fewer labels.");
+}
+
 template <class Stored>
-std::optional<Volume> write(const PlainSamples& samples, Volume volume,
-                            const std::filesystem::path& target) {
+void write_numbers(const PlainSamples& samples, const std::vector<Stored>& values,
+                   const Volume& volume, std::byte* to) {
+  Numbers<Stored> numbers(values);
+  with_sample(volume.type, [&](auto number) {
+    for_each_piece<Stored>(samples, volume.sample_count(), [&](std::span<const Stored> piece) {
+      for (const Stored value : piece) {
+        number = static_cast<decltype(number)>(numbers.of(value));
+        std::memcpy(to, &number, sizeof(number));
+        to += sizeof(number);
+      }
+      return true;
+    });
+  });
+}
+
+template <class Stored>
+std::optional<Volume> write(const PlainSamples& samples, Volume volume, const ImportTask& task) {
   Survey<Stored> survey;
-  for_each_piece<Stored>(samples, volume.sample_count(),
-                         [&](std::span<const Stored> piece) { return survey.take(piece); });
+  for_each_piece<Stored>(samples, volume.sample_count(), [&](std::span<const Stored> piece) {
+    survey.take(piece);
+    return true;
+  });
   const bool is_declared = samples.are_labels || !volume.labels.empty();
-  if (!survey.may_be_labels() || (!is_declared && !survey.is_flat())) return std::nullopt;
-  const std::vector<Stored> values = survey.number_values();
+  if (!survey.is_wide() || (!is_declared && !survey.is_flat())) return std::nullopt;
+  Values<Stored> found;
+  bool are_few = true;
+  for_each_piece<Stored>(samples, volume.sample_count(), [&](std::span<const Stored> piece) {
+    return are_few = found.take(piece);
+  });
+  if (!are_few || !found.sort()) {
+    if (is_declared) throw_too_many();
+    return std::nullopt;
+  }
+  const std::vector<Stored>& values = found.all();
   if (!std::in_range<std::int64_t>(values.back())) {
     throw_unusable("The label " + std::to_string(values.back()) +
                    " is too large: labels up to 9223372036854775807 are read. Number the labels "
@@ -137,34 +196,22 @@ std::optional<Volume> write(const PlainSamples& samples, Volume volume,
   volume.labels = entries_of(values, volume.labels);
   volume.type = values.size() <= std::numeric_limits<std::uint8_t>::max() ? SampleType::kUint8
                                                                           : SampleType::kUint16;
-  CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
-  std::byte* to = writer.samples().data();
-  with_sample(volume.type, [&](auto number) {
-    for_each_piece<Stored>(samples, volume.sample_count(), [&](std::span<const Stored> piece) {
-      for (const Stored value : piece) {
-        if constexpr (std::is_integral_v<decltype(number)>) {
-          number = static_cast<decltype(number)>(survey.number_of(value));
-        }
-        std::memcpy(to, &number, sizeof(number));
-        to += sizeof(number);
-      }
-      return true;
-    });
-  });
+  const auto dims =
+      samples.is_segmentation ? with_room(volume.dims, volume.type, task.limits) : volume.dims;
+  CanonicalWriter writer(task.target, {dims, volume.type, volume.geometry});
+  write_numbers(samples, values, volume, writer.samples().data());
   volume.notes.push_back(renumbered_note(values.size()));
-  return finish(writer, std::move(volume));
+  return finish(writer, std::move(volume), {.is_segmentation = samples.is_segmentation});
 }
 
 }  // namespace
 
 std::optional<Volume> write_wide_labels(const PlainSamples& samples, const Volume& volume,
-                                        const std::filesystem::path& target) {
+                                        const ImportTask& task) {
   if (samples.layout.rescale) return std::nullopt;
-  if (samples.layout.type == StoredType::kUint64) {
-    return write<std::uint64_t>(samples, volume, target);
-  }
-  if (samples.layout.type == StoredType::kInt64)
-    return write<std::int64_t>(samples, volume, target);
+  if (samples.layout.type == StoredType::kUint64)
+    return write<std::uint64_t>(samples, volume, task);
+  if (samples.layout.type == StoredType::kInt64) return write<std::int64_t>(samples, volume, task);
   return std::nullopt;
 }
 

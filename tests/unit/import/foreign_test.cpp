@@ -419,5 +419,29 @@ TEST(ForeignSamples, Of64BitsWithoutFlatRegionsAreNoLabels) {
   EXPECT_EQ(samples_of<double>(outcome)[23], 0x1p43);
 }
 
+// Neither a signed nor an unsigned type of 32 bits has both.
+TEST(ForeignSamples, Of64BitsOnBothSidesAreNumberedLabels) {
+  const Outcome outcome = imported(regions<std::int64_t>({0, -1, 5, 3'000'000'000}));
+  EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
+  EXPECT_THAT(
+      outcome.volume.labels,
+      ElementsAre(LabelEntry{.label = -1, .values = {1}}, LabelEntry{.label = 5, .values = {2}},
+                  LabelEntry{.label = 3'000'000'000, .values = {3}}));
+  EXPECT_THAT(outcome.volume.notes.back().detail,
+              HasSubstr("The samples have 3 labels without a name"));
+}
+
+TEST(ForeignSamples, Of64BitsThatAreTooManyLabelsAreRefused) {
+  std::vector<std::int64_t> ids;
+  for (std::int64_t at = 0; at < std::int64_t{65'536} * 3; ++at) ids.push_back((at / 3 + 1) << 20);
+  std::string file =
+      nifti({.dim = {3, 256, 256, 3, 1, 1, 1, 1}, .datatype = 1024, .bitpix = 64}, bytes_of(ids));
+  // An image, unless the header says otherwise.
+  EXPECT_EQ(imported(import_bytes(file)).volume.type, SampleType::kFloat64);
+  const std::int16_t intent = 1002;
+  file.replace(68, sizeof(intent), reinterpret_cast<const char*>(&intent), sizeof(intent));
+  EXPECT_THAT(import_bytes(file).error, HasSubstr("at most 65535"));
+}
+
 }  // namespace
 }  // namespace isomesh::import::test

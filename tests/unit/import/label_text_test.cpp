@@ -2,6 +2,7 @@
 #include "server/import/labels/label_text.h"
 
 #include <filesystem>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +11,7 @@
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/other_writers.h"
+#include "tests/unit/import/pictures.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
@@ -230,6 +232,56 @@ TEST(LabelsBeside, AreThoseOfAStackOfPictures) {
                    {}, {.spacing = std::array<double, 3>{1, 1, 1}}));
   EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(1, "liver")));
   EXPECT_THAT(outcome.volume.ignored, IsEmpty());
+}
+
+// The names of labels that the volume has already, but without names.
+TEST(LabelsBeside, NameLabelsOf64BitsAndOfPalettes) {
+  constexpr std::int64_t kId = 720575940618780781;
+  std::vector<std::int64_t> ids(12, 0);
+  ids.insert(ids.end(), 12, kId);
+  ids.insert(ids.end(), 12, 3);
+  const std::string wide =
+      nifti({.dim = {3, 6, 2, 3, 1, 1, 1, 1}, .datatype = 1024, .bitpix = 64}, bytes_of(ids));
+  EXPECT_THAT(labels_in({{"a.nii", wide}, {"a.txt", "720575940618780781 axon\n9 other\n"}}),
+              ElementsAre(LabelEntry{.label = 3, .values = {1}},
+                          LabelEntry{.label = kId, .name = "axon", .values = {2}}));
+
+  const PictureFields fields = {
+      .width = 3, .height = 2, .palette = {{0, 0, 0}, {255, 0, 0}, {0, 128, 0}}};
+  const std::string picture = png_picture(fields, std::string("\0\1\1\0\2\2", 6));
+  const Outcome pictures = imported(import_bytes(
+      zip({{"m/1.png", picture}, {"m/2.png", picture}, {"m/names.txt", "1 liver 0 0 255 0\n"}}), {},
+      {.spacing = std::array<double, 3>{1, 1, 1}}));
+  EXPECT_THAT(pictures.volume.labels,
+              ElementsAre(entry(1, "liver", "#ff0000"), entry(2, "", "#008000")));
+  EXPECT_THAT(pictures.volume.ignored, IsEmpty());
+}
+
+// A large background makes regions of an image, too.
+TEST(LabelsBeside, WithAnotherNameMakeLabelsOfFewValuesOnly) {
+  std::string all;
+  for (int value = 0; value < 256; ++value) all += std::to_string(value) + " x\n";
+  std::string samples(8000, '\0');
+  for (std::size_t at = 0; at < 4000; ++at) {
+    samples[at] = static_cast<char>(at % 2 == 0 ? 0 : at / 2 % 100);
+    if (at % 8 < 4) samples[at] = static_cast<char>(at / 8 % 100);
+  }
+  const std::string volume = nifti({.dim = {3, 40, 20, 10, 1, 1, 1, 1}}, samples);
+  EXPECT_THAT(codes_of(imported(import_bytes(zip({{"ct.nii", volume}, {"labels.txt", all}})))),
+              IsEmpty());
+  EXPECT_THAT(codes_of(imported(import_bytes(zip({{"ct.nii", volume}, {"ct.txt", all}})))),
+              ElementsAre("looks-like-labels"));
+}
+
+TEST(LabelsBeside, KeepTheSuggestionWithoutSamplesThatAreNoNumbers) {
+  std::vector<float> samples;
+  for (int at = 0; at < 24; ++at) samples.push_back(static_cast<float>(at * 2 % 5));
+  samples[4] = samples[9] = std::numeric_limits<float>::quiet_NaN();
+  const std::string volume = nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples));
+  const Outcome labels =
+      imported(import_bytes(zip({{"x.nii", volume}, {"x.txt", "1 liver\n2 spleen\n"}})));
+  EXPECT_EQ(labels.volume.type, SampleType::kUint8);
+  EXPECT_EQ(labels.volume.suggested_iso, imported(import_bytes(volume)).volume.suggested_iso);
 }
 
 TEST(LabelsBeside, OfOtherLabelsAreNotUsed) {

@@ -321,5 +321,50 @@ TEST(NrrdSegments, OfNonsenseAreRefused) {
               HasSubstr("Segment0_LabelValue"));
 }
 
+TEST(NrrdSegments, AreClosedWhateverTheirTypeIs) {
+  const std::vector<Key> keys = {{"0_Name", "liver"}, {"0_LabelValue", "1"}, {"0_Layer", "0"}};
+  const std::vector<std::uint8_t> bytes = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+                                           0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  const auto of = [&]<class Number>(const char* type, Number far) {
+    std::vector<Number> samples(bytes.begin(), bytes.end());
+    samples[0] = far;
+    Lines lines = with(small_nrrd(), "type", type);
+    lines.emplace_back("endian", "little");
+    return imported(import_bytes(with_segments(lines, keys, bytes_of(samples))));
+  };
+  const Outcome expected = of("uint8", std::uint8_t{1});
+  EXPECT_THAT(codes_of(expected), Contains("empty-planes"));
+  EXPECT_EQ(of("int64", std::int64_t{1}).canonical, expected.canonical);
+  EXPECT_EQ(of("uint64", std::uint64_t{1}).canonical, expected.canonical);
+  EXPECT_EQ(of("float", 1.0F).canonical, expected.canonical);
+  const Outcome wide = of("int64", std::int64_t{1} << 40);
+  EXPECT_EQ(wide.volume.dims, expected.volume.dims);
+  EXPECT_THAT(codes_of(wide), Contains("empty-planes"));
+  EXPECT_THAT(wide.volume.labels,
+              ElementsAre(entry(1, "liver", {1}), entry(std::int64_t{1} << 40, "", {2})));
+  // Fractions are no labels, and stay as they are.
+  const Outcome fractions = of("float", 0.5F);
+  EXPECT_EQ(fractions.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
+  EXPECT_EQ(fractions.volume.type, SampleType::kFloat32);
+  EXPECT_EQ(fractions.sample_bytes().size(), 96);
+}
+
+// Far from the origin, single precision has no room for another plane.
+TEST(NrrdSegments, AreRefusedIfTheirEndsCannotBeClosed) {
+  const std::vector<Key> keys = {{"0_Name", "liver"}, {"0_LabelValue", "1"}, {"0_Layer", "0"}};
+  std::string samples(24, '\0');
+  samples[15] = '\1';
+  std::size_t refused = 0;
+  for (int x = 65'528; x < 65'540; ++x) {
+    const Lines lines = with(small_nrrd(), "space origin", '(' + std::to_string(x) + ",0,0)");
+    if (!import_bytes(nrrd(lines, samples)).imported()) continue;
+    const Outcome outcome = import_bytes(with_segments(lines, keys, samples));
+    if (outcome.imported()) continue;
+    ++refused;
+    EXPECT_THAT(outcome.error, HasSubstr("cannot be closed at its ends"));
+  }
+  EXPECT_EQ(refused, 1);
+}
+
 }  // namespace
 }  // namespace isomesh::import::test

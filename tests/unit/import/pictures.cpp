@@ -88,6 +88,9 @@ std::string tiff_picture(const PictureFields& fields, const std::vector<std::str
         file += number(static_cast<std::uint16_t>(value * 257));
       }
     }
+    const std::uint32_t description = size();
+    file += fields.description;
+    if (file.size() % 2 != 0) file += '\0';
     const std::uint32_t depths = size();
     for (int at = 0; at < fields.components; ++at) file += number(fields.bits);
     const bool is_one = fields.components == 1;
@@ -107,6 +110,10 @@ std::string tiff_picture(const PictureFields& fields, const std::vector<std::str
                                         entry(277, 3, 1, fields.components),
                                         entry(278, 3, 1, fields.height),
                                         entry(279, 4, 1, static_cast<std::uint32_t>(page.size()))};
+    if (!fields.description.empty()) {
+      const auto letters = static_cast<std::uint32_t>(fields.description.size());
+      entries.insert(entries.begin() + 5, entry(270, 2, letters, description));
+    }
     if (!fields.palette.empty()) {
       entries.push_back(entry(320, 3, static_cast<std::uint32_t>(3 * colours), map));
     }

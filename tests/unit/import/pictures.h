@@ -18,6 +18,7 @@ struct PictureFields {
   std::vector<std::array<std::uint8_t, 3>> palette = {};
   std::uint16_t format = 1;       // of TIFF: 1 unsigned, 2 signed, 3 float
   std::uint16_t photometric = 1;  // of grey TIFF: 0 if 0 is white
+  std::string description = {};   // of TIFF; empty or longer than four bytes
 };
 
 // `rows` are the picture's rows of whole bytes from top to bottom, as each format stores them: BMP

@@ -53,6 +53,17 @@ TEST(Pictures, PagesOfATiffHaveOnePalette) {
   EXPECT_EQ(outcome.volume.labels.size(), 2);
 }
 
+// The samples are no longer the indices then.
+TEST(Pictures, ColoursOfCalibratedIndicesAreNotThoseOfLabels) {
+  PictureFields fields = kLabels;
+  fields.description = "ImageJ=1.53t\nimages=2\nslices=2\ncf=0\nc0=0\nc1=2\n";
+  const Outcome outcome = import_bytes(tiff_picture(fields, {"\0\1\1\0\2\2"s, "\0\0\1\0\0\2"s}), {},
+                                       {.spacing = std::array<double, 3>{1, 1, 1}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.range[1], 4);
+  EXPECT_EQ(outcome.volume.labels.size(), 0);
+}
+
 TEST(Pictures, PalettesMayDifferOnlyInUnusedColours) {
   PictureFields other = kLabels;
   other.palette = {{0, 0, 0}, {255, 0, 0}};

@@ -165,8 +165,12 @@ void note_distance(const Stack& stack, const ImportOptions& options, std::vector
     const Vector3 step =
         difference(image.frames.back().plane.position, image.frames.front().plane.position);
     const bool is_backwards = dot(step, normal) < 0;
-    const std::string found = "The DICOM image has " + std::to_string(image.frames.size()) +
-                              " frames, but no position for each of them.";
+    std::string found = "The DICOM image has " + std::to_string(image.frames.size()) +
+                        " frames, but no position for each of them.";
+    if (image.may_be_times) {
+      found += " They may be one slice at several times, not slices of a volume: their order " +
+               tag_name(kFrameIncrementPointer) + " is that of time.";
+    }
     const std::string how =
         in_mm(stack.geometry.spacing[2]) + " apart, as the " +
         (image.is_distance_assumed ? "slice thickness " + tag_name(kSliceThickness)
@@ -307,6 +311,17 @@ void note_place(const Stack& stack, const ImportOptions& options, std::vector<No
                           "orientation along the patient's x and y."));
 }
 
+// The distance between slices of a file that has none.
+double told_distance(const Stack& stack, const ImportOptions& options) {
+  if (options.spacing) return (*options.spacing)[2];
+  const auto& [across, down] = stack.slices.front().frame->plane.spacing;
+  throw_choice("The DICOM tomogram does not declare the distance between its slices " +
+                   tag_name(kSpacingBetweenSlices) + " nor their thickness " +
+                   tag_name(kSliceThickness) + '.' + begin_remedy(options, "Add") +
+                   "spacing=X,Y,Z (mm); Z is the distance, and X and Y are not used.",
+               {{"spacing", to_text(across) + ',' + to_text(down) + ",1", "a distance of 1 mm"}});
+}
+
 }  // namespace
 
 Stack choose_stack(std::vector<Slice> slices, const SameSamples& same_samples,
@@ -317,11 +332,14 @@ Stack choose_stack(std::vector<Slice> slices, const SameSamples& same_samples,
   if (std::ranges::any_of(slices, is_label_slice)) {
     throw_unusable("The series is not a single volume: it mixes images and segmentations.");
   }
-  refuse_spacing(options);
+  const bool is_unknown = std::ranges::any_of(
+      slices, [](const Slice& slice) { return slice.image->is_distance_unknown; });
+  if (!is_unknown) refuse_spacing(options);
   DistinctSlices distinct = without_duplicates(
       chosen_of(split_volumes(std::move(slices)), options, notes), same_samples, options, notes);
   Stack stack = make_stack(std::move(distinct.slices), options, notes);
   stack.left_out = std::move(distinct.left_out);
+  if (is_unknown) stack.geometry.spacing[2] = told_distance(stack, options);
   note_distance(stack, options, notes);
   note_directions(stack, options, notes);
   note_mappings(stack, notes);

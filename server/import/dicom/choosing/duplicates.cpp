@@ -36,18 +36,40 @@ std::vector<std::span<Placed>> positions_of(std::span<Placed> placed) {
 struct Duplicates {
   std::size_t same = 0;
   std::size_t different = 0;
+  std::size_t doubled = 0;        // positions with several slices
+  std::size_t doubtful = 0;       // positions with slices that differ
+  std::size_t positions = 0;      // all
   const Placed* first = nullptr;  // of those that differ
   const Placed* second = nullptr;
 };
 
+// "at 2 of 93 positions"
+std::string share_of(const Duplicates& found) {
+  return "at " + std::to_string(found.doubtful) + " of " + std::to_string(found.positions) +
+         " positions";
+}
+
+// If half of the positions have several slices, and half of these differ, they are rather two
+// volumes, one of which lacks some. One slice of each position would mix both.
+bool may_be_mixed(const Duplicates& found) {
+  return found.doubled * 2 >= found.positions && found.doubtful * 2 >= found.doubled;
+}
+
 [[noreturn]] void throw_different(const Duplicates& found, const ImportOptions& options) {
   const std::string first = place_of(found.first->slice);
-  throw_overridable(NoteCode::kDuplicateSlice,
-                    "A slice occurs more than once, with other samples: " + first + " and " +
-                        place_of(found.second->slice) + " lie at one position" +
-                        (found.different > 1 ? ", and there are more such slices." : ".") +
-                        begin_remedy(options, "Add") + "accept=duplicate-slice to use " + first +
-                        '.');
+  const std::string what = "A slice occurs more than once, with other samples, " + share_of(found) +
+                           ": " + first + " and " + place_of(found.second->slice) +
+                           " lie at one position.";
+  if (may_be_mixed(found)) {
+    throw_unusable(what +
+                   " So the series seems to hold several volumes, of which one is incomplete, and "
+                   "nothing shows which slices belong together. Upload the slices of one volume.");
+  }
+  throw_overridable(
+      NoteCode::kDuplicateSlice,
+      what + begin_remedy(options, "Add") + "accept=duplicate-slice to use " + first +
+          (found.different > 1 ? " and, of the others, the one with the lowest instance number."
+                               : "."));
 }
 
 Note note_on(const Duplicates& found) {
@@ -59,8 +81,9 @@ Note note_on(const Duplicates& found) {
   if (found.different > 0) {
     detail += (detail.empty() ? "" : " ") + count_of(found.different, "slice") +
               (found.different == 1 ? " was" : " were") +
-              " left out, with the position of another one and other samples. The request accepts "
-              "that: the lowest instance number was used, or else the first name.";
+              " left out, with the position of another one and other samples, " + share_of(found) +
+              ". The request accepts that: the lowest instance number was used, or else the first "
+              "name.";
   }
   return note_of(NoteCode::kDuplicateSlice, std::move(detail));
 }
@@ -79,10 +102,13 @@ DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& 
   }
   DistinctSlices distinct;
   Duplicates found;
+  found.positions = positions.size();
   for (const std::span<Placed> position : positions) {
     std::ranges::sort(position, is_before);
     const Placed& first = position.front();
     distinct.slices.push_back(first.slice);
+    const std::size_t different_before = found.different;
+    const std::size_t left_out_before = distinct.left_out.size();
     for (const Placed& other : position.subspan(1)) {
       // Beside the first one in its plane; make_stack refuses it.
       if (length(difference(other.position(), first.position())) > kSamePlaceMm) {
@@ -99,8 +125,10 @@ DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& 
         found.second = &other;
       }
     }
+    if (found.different > different_before) ++found.doubtful;
+    if (distinct.left_out.size() > left_out_before) ++found.doubled;
   }
-  if (found.different > 0 && !options.accepts(NoteCode::kDuplicateSlice)) {
+  if (found.different > 0 && (may_be_mixed(found) || !options.accepts(NoteCode::kDuplicateSlice))) {
     throw_different(found, options);
   }
   if (!distinct.left_out.empty()) notes.push_back(note_on(found));

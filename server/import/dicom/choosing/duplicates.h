@@ -21,8 +21,8 @@ struct DistinctSlices {
 // name. Adds a note. Changes nothing if each position has as many slices, unless all of them have
 // the same samples: others are several volumes.
 //
-// Throws Error kUnusableVolume as refuse_mixtures does, and, overridable, if slices at one place
-// have different values.
+// Throws Error kUnusableVolume as refuse_mixtures does, and if slices at one place have different
+// values: overridable unless at least half of the places have several slices, half of which differ.
 DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& same_samples,
                                   const ImportOptions& options, std::vector<Note>& notes);
 

@@ -1,6 +1,7 @@
 #include "server/import/dicom/contours/painter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -118,6 +119,13 @@ void Painter::find_rectangle(const ContourGrid& grid) {
   };
   width_ = size(0, left_);
   height_ = size(1, top_);
+}
+
+bool Painter::is_shifted() const {
+  if (is_outside()) return false;
+  return std::ranges::all_of(
+      std::array{planes_.front().place - usual_ / 2, planes_.back().place + usual_ / 2},
+      [](double end) { return std::abs(end - std::round(end)) <= kPlaceTolerance; });
 }
 
 std::optional<Patch> Painter::slice(std::uint32_t number) {

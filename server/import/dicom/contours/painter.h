@@ -42,6 +42,9 @@ class Painter {
   std::size_t tilted() const { return tilted_; }
   // Slices that were interpolated since the start.
   std::size_t interpolated() const { return interpolated_; }
+  // True if both ends lie on slices, of which only the first is drawn: then the structure is half a
+  // slice nearer to the first slice.
+  bool is_shifted() const;
   // True if no contour lies within the grid.
   bool is_outside() const { return planes_.empty() || width_ == 0 || height_ == 0; }
 

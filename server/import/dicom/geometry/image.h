@@ -122,6 +122,8 @@ struct Image {
   bool is_distance_assumed = false;  // the frames' distance is their slice thickness
   // The object has one position for all frames. The others follow along the normal.
   bool has_one_position = false;
+  bool may_be_times = false;         // those frames, by what the object says of their order
+  bool is_distance_unknown = false;  // the frames are 1 mm apart instead
   PlaceKind place = PlaceKind::kPatient;
   // The most mappings to different real world values that a frame of a parametric map has.
   std::uint32_t value_mappings = 0;

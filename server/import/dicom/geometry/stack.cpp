@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -123,15 +124,14 @@ Gaps gaps_of(std::span<const Placed> placed) {
   return gaps;
 }
 
-[[noreturn]] void throw_incomplete(std::span<const Placed> placed, const Gaps& gaps,
-                                   bool from_end) {
+std::string incomplete_reason(std::span<const Placed> placed, const Gaps& gaps, bool from_end) {
   std::size_t behind = 1;
   while (gaps.steps[behind] - gaps.steps[behind - 1] < 2) ++behind;
   const std::string one = place_of(placed[behind - 1].slice);
   const std::string other = place_of(placed[behind].slice);
-  throw_unusable("The series is incomplete: " +
-                 missing_slices(gaps.missing, placed.size() + gaps.missing.size(), from_end) +
-                 (one.empty() ? "." : ". There is a gap between " + one + " and " + other + "."));
+  return "The series is incomplete: " +
+         missing_slices(gaps.missing, placed.size() + gaps.missing.size(), from_end) +
+         (one.empty() ? "." : ". There is a gap between " + one + " and " + other + ".");
 }
 
 std::string uneven_reason(std::span<const Placed> placed, const Gaps& gaps, bool from_end) {
@@ -188,13 +188,20 @@ EvenLine evened_line(std::span<const Placed> placed, const Gaps& gaps, const std
                      bool from_end, const ImportOptions& options, std::vector<Note>& notes) {
   std::vector<Vector3> places;
   for (const Placed& each : placed) places.push_back(each.position());
-  const EvenLine line = nearest_line(places, gaps.steps);
+  std::vector<double> steps(placed.size());
+  std::iota(steps.begin(), steps.end(), 0);
+  const EvenLine line = nearest_line(places, steps);
   const double distance = length(line.step);
-  const bool is_whole = gaps.steps.back() == static_cast<double>(placed.size() - 1);
-  if (!is_whole && line.explains_places()) throw_incomplete(placed, gaps, from_end);
-  if (!is_whole || line.farthest >= distance / 2) throw_unusable(reason);
+  // Rounding of gaps to one and two units looks as if slices were missing.
+  const bool is_whole = gaps.steps == steps;
+  if (!is_whole && !line.explains_places()) {
+    const bool is_incomplete =
+        gaps.uneven == 0 || nearest_line(places, gaps.steps).explains_places();
+    throw_unusable(is_incomplete ? incomplete_reason(placed, gaps, from_end) : reason);
+  }
+  if (line.farthest >= distance / 2) throw_unusable(reason);
   const std::string evenly = "evenly spaced slices, " + in_mm(distance) + " apart";
-  if (line.explains_places() && !may_hide_a_slice(placed, line.rounding)) {
+  if (is_whole && line.explains_places() && !may_hide_a_slice(placed, line.rounding)) {
     notes.push_back(note_of(NoteCode::kPositionsRounded,
                             "The positions of the slices are rounded to " +
                                 in_mm(std::ranges::max(line.rounding)) + ". They are those of " +
@@ -203,7 +210,8 @@ EvenLine evened_line(std::span<const Placed> placed, const Gaps& gaps, const std
   }
   if (!options.accepts(NoteCode::kPositionsRounded)) {
     throw_overridable(NoteCode::kPositionsRounded,
-                      reason + begin_remedy(options, "Add") + "accept=positions-rounded to read " +
+                      reason + (is_whole ? "" : " Or its positions are rounded, and none is.") +
+                          begin_remedy(options, "Add") + "accept=positions-rounded to read " +
                           evenly + ": they lie up to " + in_mm(line.farthest) +
                           " away from the positions of the file.");
   }
@@ -231,18 +239,16 @@ Stack make_stack(std::vector<Slice> slices, const ImportOptions& options,
   stack.numbered_from_end = falls(placed);
   refuse_shared_positions(placed, stack.numbered_from_end);
   const Gaps gaps = gaps_of(placed);
-  if (gaps.uneven == 0 && !gaps.missing.empty()) {
-    throw_incomplete(placed, gaps, stack.numbered_from_end);
-  }
   Plane first = placed.front().slice.frame->plane;
   Vector3 step = difference(placed.back().position(), placed.front().position());
   for (double& part : step) part /= static_cast<double>(placed.size() - 1);
-  const auto reason = gaps.uneven != 0
-                          ? std::optional(uneven_reason(placed, gaps, stack.numbered_from_end))
-                          : crooked_reason(placed, step, stack.numbered_from_end);
+  const bool from_end = stack.numbered_from_end;
+  const auto reason = gaps.uneven != 0 ? std::optional(uneven_reason(placed, gaps, from_end))
+                      : !gaps.missing.empty()
+                          ? std::optional(incomplete_reason(placed, gaps, from_end))
+                          : crooked_reason(placed, step, from_end);
   if (reason) {
-    const EvenLine line =
-        evened_line(placed, gaps, *reason, stack.numbered_from_end, options, notes);
+    const EvenLine line = evened_line(placed, gaps, *reason, from_end, options, notes);
     first.position = line.origin;
     step = line.step;
   }

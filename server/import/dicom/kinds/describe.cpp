@@ -34,18 +34,48 @@ std::uint32_t frame_count(const DataSet& data) {
                  ", not a number from 1 to " + std::to_string(kMostFrames) + ".");
 }
 
-// True for several frames with the position of the first alone: in the object, or in the functional
-// groups that all frames share.
-bool has_one_position(const DataSet& data, std::uint32_t frames) {
-  if (frames == 1 || is_dose(data) || !data.text(kSegmentationType).empty()) return false;
-  for (const DataSet& groups : data.items(kPerFrameFunctionalGroups)) {
-    if (groups.item(kPlanePositionSequence) || groups.item(kPlanePositionVolumeSequence)) {
-      return false;
+// True if a frame has a place of its own that differs from the first one's, or if frames at one
+// place differ in time or otherwise.
+bool have_own_places(const DataSet& data) {
+  const auto all = data.items(kPerFrameFunctionalGroups);
+  bool has_place = false;
+  for (std::size_t frame = 0; frame < all.size(); ++frame) {
+    if (all[frame].item(kPlanePositionVolumeSequence) != nullptr) return true;
+    for (const auto& [sequence, tag] : {std::pair{kPlanePositionSequence, kImagePosition},
+                                        std::pair{kPlaneOrientationSequence, kImageOrientation}}) {
+      const auto place_in = [&](const DataSet& groups) {
+        const DataSet* item = groups.item(sequence);
+        return item == nullptr ? std::string_view() : item->text(tag);
+      };
+      if (place_in(all[frame]) != place_in(all.front())) return true;
+      has_place = has_place || !place_in(all[frame]).empty();
     }
   }
-  const Attributes shared(data, frames);
-  return !shared.place(kPlanePositionSequence).text(kImagePosition).empty() &&
-         !shared.place(kPlaneOrientationSequence).text(kImageOrientation).empty();
+  if (!has_place) return false;
+  for (std::uint32_t frame = 1; frame < all.size(); ++frame) {
+    if (phases_of_frame(data, frame) != phases_of_frame(data, 0)) return true;
+  }
+  return false;
+}
+
+// True for several frames with one position: in the object, in the functional groups that all
+// frames share, or the same in each frame's own.
+bool has_one_position(const DataSet& data, std::uint32_t frames) {
+  if (frames == 1 || is_dose(data) || !data.text(kSegmentationType).empty()) return false;
+  if (have_own_places(data)) return false;
+  const Attributes first(data, 0);
+  return !first.place(kPlanePositionSequence).text(kImagePosition).empty() &&
+         !first.place(kPlaneOrientationSequence).text(kImageOrientation).empty();
+}
+
+// True if the frames follow one another in time.
+bool are_ordered_by_time(const DataSet& data) {
+  const std::vector<std::uint32_t> pointer = data.unsigned_numbers(kFrameIncrementPointer);
+  for (std::size_t at = 0; at + 1 < pointer.size(); at += 2) {
+    const Tag tag = pointer[at] << 16 | pointer[at + 1];
+    if (tag == kFrameTime || tag == kFrameTimeVector) return true;
+  }
+  return false;
 }
 
 void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {
@@ -265,7 +295,10 @@ Image describe_image(const DicomFile& file) {
     image.frames.push_back(describe_frame(data, number, image));
   }
   if (is_dose(data)) place_dose(data, image.frames);
-  if (has_one_position(data, frames)) place_along_normal(data, image);
+  if (has_one_position(data, frames)) {
+    place_along_normal(data, image);
+    image.may_be_times = are_ordered_by_time(data);
+  }
   if (frames == 1 && is_mosaic(data)) unfold_mosaic(data, image);
   if (is_in_volume_space(Attributes(data, 0))) image.place = PlaceKind::kVolume;
   return image;

@@ -34,7 +34,9 @@ bool is_tomogram(const DataSet& data);
 // volumes of one object differ. Sets the image's `is_distance_assumed`, and its `place`
 // if it has no position: then the first slice lies transverse at the origin.
 //
-// Throws Error kUnusableVolume if the frames are projections, or if their spacing is unknown.
+// Without a distance between the slices they are 1 mm apart, and `is_distance_unknown` is set.
+//
+// Throws Error kUnusableVolume if the frames are projections.
 void place_tomogram(const DataSet& data, std::uint32_t frames, Image& image);
 
 // Frames that hold a volume's slices as tiles, from left to right and top to bottom: mosaics of

@@ -28,9 +28,10 @@ void refuse_projections(const DataSet& data) {
 
 double slice_step(const DataSet& data, Image& image) {
   const double step = frame_distance(data, image);
+  image.is_distance_unknown = step == 0;
   if (step != 0) return step;
-  throw_unusable("The DICOM tomogram does not declare the distance between its slices " +
-                 tag_name(kSpacingBetweenSlices) + ".");
+  image.is_distance_assumed = false;
+  return 1;
 }
 
 // The element in the sequence of detectors, or in the object.

@@ -302,5 +302,36 @@ TEST(DicomPadding, OfZeroAroundLabelsStays) {
   EXPECT_EQ(cut.volume.range, (std::array<double, 2>{0, 2}));
 }
 
+// Flat regions of fractions, as in a PET: no labels, so padding of zero is noted.
+TEST(DicomPadding, OfZeroAroundFractionsIsNoted) {
+  const auto stored = [](std::uint32_t i, std::uint32_t j, std::uint32_t) {
+    return i < 2 ? 0 : j < 3 ? 1 : 2;
+  };
+  const Outcome outcome =
+      imported(import_objects(files_of(stored, [](DicomObject& object, std::uint32_t k) {
+        with_padding(0)(object, k);
+        object.text(kRescaleSlope, "DS", "0.3").text(kRescaleIntercept, "DS", "0");
+      })));
+  EXPECT_FLOAT_EQ(static_cast<float>(outcome.volume.range[0]), 0.3F);
+  EXPECT_THAT(note_detail(outcome, NoteCode::kPadding), HasSubstr("48 of the 192 samples"));
+}
+
+TEST(DicomPadding, WithoutNumbersIsNoImage) {
+  const auto change = [](DicomObject& object, std::uint32_t) {
+    std::string samples;
+    for (std::uint32_t at = 0; at < 48; ++at) {
+      samples += real_bytes(is_padded(at % 8) ? -1e6F : std::numeric_limits<float>::quiet_NaN());
+    }
+    object.erase(kPixelData)
+        .number(kBitsAllocated, 32)
+        .erase(kPixelRepresentation)
+        .bytes(kFloatPixelPaddingValue, "FL", real_bytes(-1e6F))
+        .bytes(kFloatPixelData, "OF", samples);
+  };
+  EXPECT_THAT(import_objects(files_of(padded(kPad), change)).error,
+              HasSubstr("48 of the 192 samples have the padding value of the file, and the others "
+                        "are not finite numbers, so it holds no image"));
+}
+
 }  // namespace
 }  // namespace isomesh::import::test

@@ -151,7 +151,14 @@ TEST(DicomStructures, AreInterpolatedBetweenTheirContours) {
   EXPECT_EQ(sample(outcome, 6, 6, 0), 0);
   EXPECT_EQ(sample(outcome, 6, 6, 1), 1);
   EXPECT_EQ(sample(outcome, 6, 6, 7), 0);
-  EXPECT_THAT(note_detail(outcome, NoteCode::kContoursInterpolated), HasSubstr("2 times"));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kContoursInterpolated),
+              AllOf(HasSubstr("2 times"), HasSubstr("The ends of 1 structure lie on slices")));
+  // With contours 6 mm apart the ends lie between slices.
+  const Outcome even = imported(
+      draw({{.name = "box",
+             .contours = {{box(4.5, 4.5, 8.5, 10.5, 4)}, {box(4.5, 4.5, 8.5, 10.5, 10)}}}}));
+  EXPECT_EQ(note_detail(even, NoteCode::kContoursInterpolated).find("ends"), std::string::npos);
+  EXPECT_NE(note_detail(even, NoteCode::kContoursInterpolated), "");
 }
 
 // 4 x 6 samples of a contour in each of four planes, between the slices at 4 mm and 12 mm.
@@ -329,6 +336,21 @@ TEST(SignedDistances, AreThoseOfAllPairs) {
       }
     }
   }
+}
+
+// The structures lie where the images do, so what is said of these holds for them.
+TEST(DicomStructures, HaveTheNotesOnTheGeometryOfTheirImages) {
+  DicomSeries images = kImages;
+  images.step = {0, 0, 2.5};
+  NamedFiles files = changed(images, [](DicomObject& object, std::uint32_t k) {
+    object.text(kFrameOfReferenceUid, "UI", "1.2.3.frame")
+        .text(kImagePosition, "DS", "0\\0\\" + std::to_string((k * 5 + 1) / 2));
+  });
+  const DicomObject structures = structure_set({{.contours = {{box(1.5, 1.5, 6.5, 6.5, 5)}}}});
+  files.emplace_back("RS", structures.file(kImplicit));
+  const ImportOptions options = {.series = "1.2.9"};
+  const Outcome outcome = imported(import_objects(files, options));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kPositionsRounded), HasSubstr("rounded to 1 mm"));
 }
 
 }  // namespace

@@ -73,14 +73,26 @@ TEST(DicomTomogram, IsRefusedIfItsFramesAreNoSlices) {
   DicomObject object = tomogram();
   EXPECT_THAT(import_one(object.text(kImageType, "CS", "ORIGINAL\\PRIMARY\\TOMO\\EMISSION")).error,
               HasSubstr("projections"));
-  EXPECT_THAT(import_one(tomogram().erase(kSpacingBetweenSlices)).error,
-              HasSubstr("distance between its slices"));
   EXPECT_THAT(import_one(tomogram().bytes(kSliceVector, "US", words({1, 2}))).error,
               HasSubstr("3 frames, but 2 slice numbers"));
   const Outcome thick =
       import_one(tomogram().erase(kSpacingBetweenSlices).text(kSliceThickness, "DS", "5"));
   EXPECT_EQ(thick.volume.geometry.spacing[2], 5);
   EXPECT_THAT(note_detail(thick, NoteCode::kDistanceAssumed), HasSubstr("5 mm"));
+}
+
+TEST(DicomTomogram, WithoutADistanceGetsThatOfTheRequest) {
+  const DicomObject object = tomogram().erase(kSpacingBetweenSlices);
+  const Outcome refused = import_one(object);
+  EXPECT_THAT(refused.error, HasSubstr("distance between its slices (0018,0088)"));
+  EXPECT_THAT(refused.remedy.choices,
+              ElementsAre(Choice{"spacing", "0.75,0.5,1", "a distance of 1 mm"}));
+  const Outcome outcome = imported(import_one(object, {.spacing = std::array<double, 3>{9, 9, 3}}));
+  EXPECT_THAT(outcome.volume.geometry.spacing, ElementsAre(0.75, 0.5, 3));
+  EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(1, 2, 30));
+  EXPECT_THAT(codes_of(outcome), testing::IsEmpty());
+  EXPECT_THAT(import_one(tomogram(), {.spacing = std::array<double, 3>{9, 9, 3}}).error,
+              HasSubstr("spacing"));
 }
 
 // PS3.3, A.59: positions in the space of the volume, as binary numbers.

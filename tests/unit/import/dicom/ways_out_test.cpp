@@ -106,6 +106,23 @@ TEST(DicomPositions, StillShowThatASliceIsMissing) {
   EXPECT_EQ(doubtful.remedy.overridable, "positions-rounded");
 }
 
+// Gaps of one and two units look as if slices were missing.
+TEST(DicomPositions, RoundedToWholeStepsCanBeAccepted) {
+  for (const double step : {1.25, 1.5}) {
+    const std::vector<double> heights = rounded_heights(24, step, 1);
+    const Outcome refused = import_objects(at_heights(heights));
+    EXPECT_EQ(refused.remedy.overridable, "positions-rounded");
+    EXPECT_THAT(refused.error, AllOf(HasSubstr("The series is incomplete"),
+                                     HasSubstr("Or its positions are rounded")));
+    const Outcome outcome =
+        imported(import_objects(at_heights(heights), {.accept = {"positions-rounded"}}));
+    EXPECT_EQ(outcome.volume.dims[2], 24);
+    EXPECT_NEAR(outcome.volume.geometry.spacing[2], step, 1.0 / 23);
+    EXPECT_THAT(note_detail(outcome, NoteCode::kPositionsRounded),
+                HasSubstr("The request accepts"));
+  }
+}
+
 TEST(DicomPositions, ThatAreUnevenCanBeAccepted) {
   const std::vector<double> heights = {0, 2.5, 5, 7.9, 10, 12.5};
   const Outcome outcome = import_objects(at_heights(heights));
@@ -164,10 +181,38 @@ TEST(DicomDuplicates, ThatDifferCanBeAccepted) {
     const Outcome outcome = import_objects(files);
     EXPECT_EQ(outcome.remedy.overridable, "duplicate-slice") << what;
     EXPECT_THAT(outcome.error, HasSubstr("\"IM3\" and \"again\" lie at one position")) << what;
+    EXPECT_THAT(outcome.error, HasSubstr("at 1 of 6 positions")) << what;
     const Outcome accepted = imported(import_objects(files, {.accept = {"duplicate-slice"}}));
     EXPECT_EQ(accepted.canonical, expected) << what;
     EXPECT_THAT(note_detail(accepted, NoteCode::kDuplicateSlice), HasSubstr("other samples"));
     EXPECT_EQ(accepted.volume.ignored.at(0).name, "again");
+  }
+}
+
+// Two echoes, of which slices are missing, are no volume with duplicates.
+TEST(DicomDuplicates, AtHalfOfThePositionsCannotBeAccepted) {
+  struct Case {
+    std::uint32_t doubled;
+    std::uint32_t different;
+    bool is_accepted;
+  };
+  for (const auto& [doubled, different, is_accepted] :
+       {Case{2, 2, true}, Case{3, 3, false}, Case{5, 5, false}, Case{4, 2, false},
+        Case{5, 1, true}}) {
+    NamedFiles files = DicomSeries{}.files();
+    for (std::uint32_t k = 0; k < doubled; ++k) {
+      DicomObject other = DicomSeries{}.slice(k).text(kSopInstanceUid, "UI", "1.2.9." + to_text(k));
+      if (k < different) other.pixels(std::string(40, '\1'), 2);
+      files.emplace_back("B" + to_text(k), other.file());
+    }
+    const Outcome outcome = import_objects(files, {.accept = {"duplicate-slice"}});
+    const std::string share = to_text(different) + " of 6 positions";
+    if (is_accepted) {
+      EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateSlice), HasSubstr(share));
+      continue;
+    }
+    EXPECT_THAT(outcome.error, AllOf(HasSubstr(share), HasSubstr("several volumes"))) << doubled;
+    EXPECT_EQ(outcome.remedy.overridable, "");
   }
 }
 
@@ -250,6 +295,31 @@ TEST(DicomFrames, WithOnePositionCanBeAccepted) {
   placeless.erase(kImagePosition);
   EXPECT_THAT(import_objects({{"one", placeless.file()}}, accepting).error,
               HasSubstr("no position for each of them"));
+}
+
+TEST(DicomFrames, WithOnePositionMayBeTimes) {
+  const auto error_of = [](const char* pointer) {
+    DicomObject object = one_position("2", "");
+    return import_objects(
+               {{"one",
+                 object.bytes(kFrameIncrementPointer, "AT", std::string(pointer, 4)).file()}})
+        .error;
+  };
+  EXPECT_THAT(error_of("\x18\0\x63\x10"), HasSubstr("one slice at several times"));
+  EXPECT_THAT(error_of("\x18\0\x65\x10"), HasSubstr("one slice at several times"));
+  EXPECT_THAT(error_of("\x18\0\x88\0"), Not(HasSubstr("times")));
+}
+
+// Each frame tells the same place.
+TEST(DicomFrames, ThatRepeatAPositionCanBeAccepted) {
+  const DicomSeries series = {.step = {0, 0, 2}};
+  DicomObject object = series.enhanced({0, 1, 2, 3, 4, 5});
+  object.items(kPerFrameFunctionalGroups, std::vector<DicomObject>(6, frame_at(series.position(0))))
+      .text(kSpacingBetweenSlices, "DS", "2");
+  const std::string file = object.file();
+  EXPECT_EQ(import_objects({{"one", file}}).remedy.overridable, "distance-assumed");
+  EXPECT_EQ(import_objects({{"one", file}}, {.accept = {"distance-assumed"}}).canonical,
+            import_objects(series.files()).canonical);
 }
 
 // Enhanced objects may share a position, too.
