@@ -191,6 +191,9 @@ bool become_labels(const Table& table, bool is_own, const ImportTask& task, Volu
     detail += " The whole numbers, " + stored + " in the file, are now " +
               std::string(to_string(volume.type)) + '.';
   }
+  std::erase_if(volume.notes, [](const Note& note) {
+    return note.code == describe(NoteCode::kLooksLikeLabels).name;
+  });
   volume.notes.push_back(note_of(NoteCode::kLooksLikeLabels, detail));
   return true;
 }
@@ -240,9 +243,16 @@ void take_labels_beside(const Companions& companions, const ImportTask& task, Vo
     return;
   }
   Table& table = tables.front();
-  if (labels_note_of(volume) == volume.notes.end()) {
+  const bool looks_like_labels = labels_note_of(volume) != volume.notes.end();
+  if (!looks_like_labels || !is_integer(volume.type)) {
     const bool is_own = begins_with(table.name, stem_of(companions.name()));
-    if (!become_labels(table, is_own, task, volume)) return;
+    if (!become_labels(table, is_own, task, volume)) {
+      if (looks_like_labels) {
+        labels_note_of(volume)->detail += " The table " + in_quotes(table.name) +
+                                          " does not name most of them, so it was not used.";
+      }
+      return;
+    }
   } else if (!naming_in(table, task, volume).is_any()) {
     labels_note_of(volume)->detail +=
         " The table " + in_quotes(table.name) + " names none of the labels, so it was not used.";

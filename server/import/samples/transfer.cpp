@@ -88,10 +88,10 @@ bool is_wide_integer(const SampleLayout& layout) {
          (layout.type == StoredType::kUint64 || layout.type == StoredType::kInt64);
 }
 
-// Floats that look like labels are a mask, or have few values in flat regions.
+// Floats with few values in flat regions are labels. Two values may as well be a mask that is to
+// stay what it is: jobs by labels round it.
 bool are_like_labels(std::span<const std::byte> samples, const Volume& volume) {
-  return volume::mask_value(samples, volume.type, volume.range) ||
-         volume::label_count(samples, volume.type, volume.dims);
+  return volume::label_count(samples, volume.type, volume.dims).value_or(0) > 2;
 }
 
 // Labels are integers: labels of floats become some, and so do 64-bit integers that fit. Returns
@@ -145,10 +145,10 @@ Note mask_note(std::int64_t value) {
                      "they keep it.");
 }
 
-// Declared labels are certain; otherwise the samples may look like labels. Only integers are
-// labels.
+// Declared labels are certain; otherwise the samples may look like labels. Floats may if all are
+// nearly whole.
 void note_labels(std::span<const std::byte> samples, Volume& volume) {
-  if (!is_integer(volume.type)) return;
+  if (!is_integer(volume.type) && !volume::whole_numbers(samples, volume.type)) return;
   const auto is_told = [](const LabelEntry& entry) { return !entry.name.empty() || entry.color; };
   const auto told = static_cast<std::size_t>(std::ranges::count_if(volume.labels, is_told));
   const bool are_known = !volume.labels.empty();  // maybe without being told, like wide labels
