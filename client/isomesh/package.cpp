@@ -68,6 +68,8 @@ class Folder {
     const bool is_link = fs::is_symlink(fs::symlink_status(path, error));
     if (status.type() == fs::file_type::none) fail(path, error.message());
     if (is_link && !fs::exists(status)) {
+      // Editors mark a file that is open by a hidden link to nothing (`.#name`).
+      if (path.filename().string().starts_with('.')) return;
       fail(path,
            "is a link to a file that is not there. Get the file, in a dataset with `datalad get`, "
            "or remove the link");
