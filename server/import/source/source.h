@@ -156,6 +156,8 @@ struct SourceVolume {
   // The decoded size in the file of one volume, and of all volumes.
   std::uint64_t volume_bytes() const { return sample_count() * bytes_per_sample(layout.type); }
   std::uint64_t stored_bytes() const { return volume_bytes() * chosen.count; }
+  // The size in a file of so many decoded bytes; empty if it depends on the samples.
+  std::optional<std::uint64_t> packed_bytes(std::uint64_t decoded) const;
   // The largest encoded size, with generous white space.
   std::uint64_t most_encoded_bytes() const;
 };
