@@ -279,28 +279,28 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
       std::move(choices));
 }
 
-void accept_frames(std::uint64_t frames, const ImportOptions& options, SourceVolume& volume) {
-  const std::string images = std::to_string(frames) + " flat images of " +
-                             std::to_string(volume.dims[0]) + " x " +
-                             std::to_string(volume.dims[1]) + " samples";
+void accept_frames(std::uint64_t frames, const std::string& axis, const ImportOptions& options,
+                   SourceVolume& volume) {
+  const std::string sequence = "The file is a sequence of " + std::to_string(frames) +
+                               " flat images of " + std::to_string(volume.dims[0]) + " x " +
+                               std::to_string(volume.dims[1]) + " samples along " + axis + ". ";
   if (!options.accepts(NoteCode::kFramesAsSlices)) {
     throw_overridable(NoteCode::kFramesAsSlices,
-                      "The file is a sequence of " + images +
-                          ", which follow each other in time or are a list. They do not lie side "
-                          "by side as the slices of a volume do. If accepted, they are read as "
-                          "evenly spaced slices.");
+                      sequence +
+                          "It does not say that they lie side by side as the slices of a volume "
+                          "do. If accepted, they are read as evenly spaced slices.");
   }
   volume.notes.push_back(note_of(NoteCode::kFramesAsSlices,
-                                 "The file is a sequence of " + images +
-                                     " in time or of a list. They were read as the slices of a "
-                                     "volume. The distance between them is not from a scan."));
+                                 sequence +
+                                     "They were read as the slices of a volume. The distance "
+                                     "between them is not from a scan."));
 }
 
-std::uint64_t volumes_of_frames(std::uint64_t count, const ImportOptions& options,
-                                SourceVolume& volume) {
+std::uint64_t volumes_of_frames(std::uint64_t count, const std::string& axis,
+                                const ImportOptions& options, SourceVolume& volume) {
   const auto& [x, y, z] = volume.dims;
   if (count < 2 || z != 1 || x == 1 || y == 1 || options.volume) return count;
-  accept_frames(count, options, volume);
+  accept_frames(count, axis, options, volume);
   volume.dims[2] = static_cast<std::uint32_t>(count);
   return 1;
 }
