@@ -1,7 +1,7 @@
 #!/bin/sh
 # Guess: `cjxl -d 0`, which its help calls mathematically lossless, keeps all values of a grey image of 12 bits, the usual depth of
 #   medical images. `jxlinfo` says of the result: "(possibly) lossless, 12-bit Grayscale".
-# Seen: of a PGM whose largest value is 4095, about 256 different values are left. The samples were taken for shares of 65535 and
+# Seen: of a PGM whose largest value is 4095, 257 different values are left. The samples were taken for shares of 65535 and
 #   then stored with 12 bits, so the lowest four are rounded away; djxl stretches them again, up to 4097, above the declared
 #   largest value. Nothing is reported. The same image with values up to 65535 is kept exactly.
 # Packages: Debian 12: libjxl-tools and libjxl0.7 0.7.0-10+deb12u1. Date: 2026-11-28.
@@ -10,7 +10,8 @@ t=$(mktemp -d)
 trap 'rm -rf "$t"' EXIT
 cd "$t"
 for name in libjxl-tools=0.7.0-10+deb12u1 libjxl0.7=0.7.0-10+deb12u1 \
-    libopenexr-3-1-30 libimath-3-1-29 libbrotli1 libgif7 libhwy1 libjpeg62-turbo liblcms2-2 libpng16-16; do
+    libopenexr-3-1-30=3.1.5-5 libimath-3-1-29=3.1.6-1 libbrotli1=1.0.9-2+deb12u1 libgif7=5.2.1-2.5+deb12u1 libhwy1=1.0.3-3+deb12u1 \
+    libjpeg62-turbo=1:2.1.5-2 liblcms2-2=2.14-2+deb12u1 libpng16-16=1.6.39-2+deb12u6; do
   apt-get download "$name" >apt.log 2>&1
 done
 for package in *.deb; do dpkg -x "$package" tree; done

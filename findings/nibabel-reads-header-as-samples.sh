@@ -8,8 +8,8 @@ set -eu
 t=$(mktemp -d)
 trap 'rm -rf "$t"' EXIT
 cd "$t"
-apt-get download python3-nibabel=5.0.0-2 python3-numpy=1:1.24.2-1+deb12u1 libblas3=3.11.0-2 liblapack3=3.11.0-2 libgfortran5 libquadmath0 \
-  python3-packaging=23.0-1 >apt.log 2>&1
+apt-get download python3-nibabel=5.0.0-2 python3-numpy=1:1.24.2-1+deb12u1 libblas3=3.11.0-2 liblapack3=3.11.0-2 libgfortran5=12.2.0-14+deb12u1 \
+  libquadmath0=12.2.0-14+deb12u1 python3-packaging=23.0-1 >apt.log 2>&1
 for package in *.deb; do dpkg -x "$package" tree; done
 cat >read.py <<'P'
 import struct

@@ -131,8 +131,9 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .is_in_mesh = true},
     {.code = NoteCode::kFramesAsSlices,
      .name = "frames-as-slices",
-     .meaning = "The file says that its frames follow each other in time or are a list. They were "
-                "read as the slices of a volume.",
+     .meaning =
+         "The file holds flat images along an axis that is not one of space, such as time or a "
+         "list. They were read as the slices of a volume.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kHeaderCorrected,

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "base/files.h"
@@ -65,13 +66,18 @@ class Folder {
     if (path.filename() == ".git") return;
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
-    const bool is_link = fs::is_symlink(fs::symlink_status(path, error));
-    if (status.type() == fs::file_type::none) fail(path, error.message());
-    if (is_link && !fs::exists(status)) {
+    std::error_code ignored;
+    const bool is_link = fs::is_symlink(fs::symlink_status(path, ignored));
+    const bool leads_nowhere = status.type() == fs::file_type::not_found ||
+                               error == std::errc::too_many_symbolic_link_levels;
+    if (is_link && leads_nowhere) {
+      // Editors mark a file that is open by a hidden link to nothing (`.#name`).
+      if (path.filename().string().starts_with('.')) return;
       fail(path,
            "is a link to a file that is not there. Get the file, in a dataset with `datalad get`, "
            "or remove the link");
     }
+    if (status.type() == fs::file_type::none) fail(path, error.message());
     if (fs::is_directory(status)) {
       // Links can multiply folders without files.
       if (is_link && ++links_ > kMostLinks) {

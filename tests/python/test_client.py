@@ -87,6 +87,8 @@ class Files(DaemonTest):
         with self.assertRaisesRegex(ValueError, "up/sub leads back to a folder"):
             self.client.upload(folder)
         (folder / "up").unlink()
+        (folder / ".#notes").symlink_to("someone@host.1234:5678")  # as Emacs marks a file that is open
+        self.assertEqual(self.client.upload(folder)["id"], volume["id"])
         (folder / "gone").symlink_to("absent")
         with self.assertRaisesRegex(FileNotFoundError, "gone is a link to a file that is not there"):
             self.client.upload(folder)

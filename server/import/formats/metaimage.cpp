@@ -296,6 +296,15 @@ bool are_frames(const HeaderTexts& fields) {
              fields, [](const auto& field) { return field.first.starts_with("Seq_Frame"); });
 }
 
+std::string frames_axis(const HeaderTexts& fields, std::size_t axes) {
+  const std::string kinds = lower(value_of(fields, "Kinds"));
+  if (kinds.find("time") != std::string::npos) return "its axis of time";
+  if (kinds.find("list") != std::string::npos) return "its axis of a list";
+  if (axes > 4) return "its axes beyond the third";
+  return axes == 4 ? "its fourth axis"
+                   : "its third axis, with a time or place for each (Seq_Frame)";
+}
+
 // Sets dims, type and encoding, and selects one of several volumes.
 SourceVolume samples_of(const HeaderTexts& fields, const std::vector<std::uint64_t>& sizes,
                         const ImportOptions& options) {
@@ -311,8 +320,9 @@ SourceVolume samples_of(const HeaderTexts& fields, const std::vector<std::uint64
                 "The samples were changed by the slope and offset of the MetaImage header. "
                 "Programs that ignore these show other values."));
   }
-  if (sizes.size() == 3 && are_frames(fields)) accept_frames(sizes[2], options, volume);
-  const std::uint64_t volumes = volumes_of_frames(volumes_beyond(sizes), options, volume);
+  const std::string axis = frames_axis(fields, sizes.size());
+  if (sizes.size() == 3 && are_frames(fields)) accept_frames(sizes[2], axis, options, volume);
+  const std::uint64_t volumes = volumes_of_frames(volumes_beyond(sizes), axis, options, volume);
   choose_volume(volumes, difference_of(fields, sizes), options, volume);
   return volume;
 }

@@ -136,32 +136,48 @@ std::vector<std::uint64_t> mif_sizes(const MifHeader& header) {
 // Volumes lie along one axis, which may vary at any speed.
 void choose_mif_volume(const std::vector<std::uint64_t>& sizes, const std::vector<StoredAxis>& axes,
                        const ImportOptions& options, SourceVolume& volume) {
-  const std::uint64_t count = volumes_beyond(sizes);
-  choose_volume(count, numbered("their fourth axis", "volume"), options, volume);
-  for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
-    if (sizes[axis] == 1) continue;
-    if (sizes[axis] != count) throw_unusable("The MIF file has several axes beyond space.");
-    std::uint64_t run = 1;
-    for (std::size_t other = 0; other < sizes.size(); ++other) {
-      if (axes[other].rank < axes[axis].rank) run *= sizes[other];
-    }
-    if (run != volume.sample_count()) volume.chosen.run = run;
-    if (axes[axis].is_reversed) volume.chosen.index = count - 1 - volume.chosen.index;
+  const auto is_long = [](std::uint64_t size) { return size > 1; };
+  const std::span beyond = std::span(sizes).subspan(3);
+  if (std::ranges::count_if(beyond, is_long) > 1) {
+    throw_unusable(
+        "The MIF file has several axes beyond space, of which one is supported. Extract a part of "
+        "it, for example the first volumes of the fifth axis with mrconvert IN -coord 4 0 OUT.");
   }
+  const std::uint64_t count = volumes_beyond(sizes);
+  const auto axis =
+      static_cast<std::size_t>(std::ranges::find_if(beyond, is_long) - beyond.begin()) + 3;
+  choose_volume(count, numbered("their axis beyond space", "volume"), options, volume);
+  if (axis == sizes.size()) return;
+  std::uint64_t run = 1;
+  for (std::size_t other = 0; other < sizes.size(); ++other) {
+    if (axes[other].rank < axes[axis].rank) run *= sizes[other];
+  }
+  if (run != volume.sample_count()) volume.chosen.run = run;
+  if (axes[axis].is_reversed) volume.chosen.index = count - 1 - volume.chosen.index;
 }
 
-// Coordinates are RAS; a reversed axis begins at its other end.
+// Coordinates are RAS; a reversed axis begins at its other end. MRtrix takes the axes for those of
+// RAS if there is no transform.
 Geometry mif_geometry(const MifHeader& header, const std::vector<StoredAxis>& axes,
                       SourceVolume& volume) {
   std::array<Vector3, 3> steps = {Vector3{1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, 0, 1}};
   Vector3 origin = {0, 0, 0};
-  const bool is_placed = header.transform.size() >= 3;
-  for (std::size_t row = 0; row < 3 && is_placed; ++row) {
+  const std::size_t lines = header.transform.size();
+  if (lines == 1 || lines == 2) {
+    throw_unusable("The MIF header's transform has " + std::to_string(lines) +
+                   (lines == 1 ? " line" : " lines") + " of three. Write the file again.");
+  }
+  for (std::size_t row = 0; row < 3 && lines > 0; ++row) {
     if (header.transform[row].size() != 4) throw_unusable("The MIF header's transform is damaged.");
     for (std::size_t axis = 0; axis < 3; ++axis) steps[axis][row] = header.transform[row][axis];
     origin[row] = header.transform[row][3];
   }
-  if (!is_placed) volume.notes.push_back(lps_assumed("A MIF file without a transform"));
+  if (lines == 0) {
+    volume.notes.push_back(note_of(NoteCode::kSpaceAssumed,
+                                   "The MIF file has no transform. Its axes x, y and z were read "
+                                   "as those of RAS, as in MRtrix. The voxel (0,0,0) is at the "
+                                   "origin."));
+  }
   const std::vector<std::string_view> sizes = parts_of(required(header.fields, kMifTitle, "vox"));
   if (sizes.size() < 3) throw_unusable("The MIF header's vox is damaged.");
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -174,13 +190,7 @@ Geometry mif_geometry(const MifHeader& header, const std::vector<StoredAxis>& ax
       steps[axis][row] = -steps[axis][row];
     }
   }
-  if (is_placed) return geometry_of_ras(origin, steps);
-  // Without a place the axes are those of LPS as they are stored.
-  volume.geometry.origin = {0, 0, 0};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    volume.geometry.spacing[axis] = finite_number(sizes[axis]).value_or(1);
-  }
-  return volume.geometry;
+  return geometry_of_ras(origin, steps);
 }
 
 SourceVolume described(const MifHeader& header, const ImportOptions& options) {
@@ -229,12 +239,16 @@ std::vector<MifData> data_of(const MifHeader& header) {
   return data;
 }
 
-std::vector<std::string> mif_data_names(const InputFile& file, const Companions& /*companions*/) {
+std::vector<std::string> names_of(const std::vector<MifData>& data) {
   std::vector<std::string> names;
-  for (const MifData& data : data_of(read_mif_header(file))) {
-    if (data.name != ".") names.push_back(data.name);
+  for (const MifData& each : data) {
+    if (each.name != ".") names.push_back(each.name);
   }
   return names;
+}
+
+std::vector<std::string> mif_data_names(const InputFile& file, const Companions& /*companions*/) {
+  return names_of(data_of(read_mif_header(file)));
 }
 
 SourceVolume parse_mif(const InputFile& file, const Companions& companions,
@@ -245,8 +259,8 @@ SourceVolume parse_mif(const InputFile& file, const Companions& companions,
   if (data.front().name == ".") {
     volume.payload = range_from(file, data.front().offset);
   } else {
-    volume.data_files = data_files_of(mif_data_names(file, companions), companions,
-                                      {.bytes = data.front().offset}, volume);
+    volume.data_files =
+        data_files_of(names_of(data), companions, {.bytes = data.front().offset}, volume);
   }
   return volume;
 }

@@ -139,6 +139,12 @@ void check_intent(const NiftiHeader& header) {
 // NIFTI_INTENT_LABEL.
 constexpr int kIntentLabel = 1002;
 
+// The fifth dimension has a matrix, a vector, a quaternion or a colour for each place.
+bool has_components(const NiftiHeader& header) {
+  constexpr std::array kIntents = {1004, 1005, 1006, 1007, 1010, 2003, 2004};
+  return header.dim[0] >= 5 && std::ranges::find(kIntents, header.intent) != kIntents.end();
+}
+
 // Everything except the location of the samples.
 SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   SourceVolume volume;
@@ -152,7 +158,15 @@ SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
     volume.notes.push_back(corrected_note(all));
   }
   volume.layout = {type_of(header), header.big_endian, rescale_of(header, volume.notes)};
-  const std::uint64_t volumes = volumes_of_frames(volumes_beyond(sizes), options, volume);
+  std::uint64_t volumes = volumes_beyond(sizes);
+  if (volumes > 1 && has_components(header)) {
+    refuse_flat("The file", volume.dims);
+  } else {
+    const std::string axis = sizes.size() < 5     ? "its fourth dimension, time"
+                             : header.dim[4] == 1 ? "its fifth dimension, of values"
+                                                  : "its dimensions beyond the third";
+    volumes = volumes_of_frames(volumes, axis, options, volume);
+  }
   choose_volume(volumes, difference_of(header), options, volume);
   volume.are_labels = header.intent == kIntentLabel;
   volume.encoding = Encoding::kRaw;

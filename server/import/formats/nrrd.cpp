@@ -217,6 +217,11 @@ bool has_frames(const NrrdFields& fields) {
   return first != fields.end() && first->first.starts_with("Seq_Frame");
 }
 
+std::string frames_axis(const std::string& kind) {
+  if (kind == "time") return "its axis of time";
+  return kind == "list" ? "its axis of a list" : "its " + kind + ", beyond the three of space";
+}
+
 // The images of a sequence take turns with each sample or row, or follow each other.
 StoredAxes axes_of_frames(std::uint64_t run, std::uint32_t row) {
   if (run == 1) return {2, 0, 1};
@@ -246,9 +251,16 @@ SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
     return volume;
   }
   const std::string& kind = sizes.volume_kind;
-  if (sizes.volumes == 1 && has_frames(fields)) accept_frames(volume.dims[2], options, volume);
-  const std::uint64_t count =
-      kind == "vector" ? sizes.volumes : volumes_of_frames(sizes.volumes, options, volume);
+  if (sizes.volumes == 1 && has_frames(fields)) {
+    accept_frames(volume.dims[2], "its third axis, with a time or place for each (Seq_Frame)",
+                  options, volume);
+  }
+  std::uint64_t count = sizes.volumes;
+  if (kind == "vector") {
+    refuse_flat("The file", volume.dims);
+  } else {
+    count = volumes_of_frames(count, frames_axis(kind), options, volume);
+  }
   if (count < sizes.volumes) volume.stored_axes = axes_of_frames(sizes.run, volume.dims[0]);
   choose_volume(count, numbered(kind == "time" ? kind : "their " + kind, kind), options, volume);
   if (count > 1 && !is_consecutive) volume.chosen.run = sizes.run;

@@ -11,8 +11,12 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::uint64_t kMostColours = std::uint64_t{1} << 23;  // of all palettes
-constexpr std::size_t kIndices = std::size_t{1} << 16;
+// The limit for the indices of all palettes, each of which has a colour and a flag.
+constexpr std::uint64_t kMostIndices = std::uint64_t{1} << 23;
+
+std::size_t indices_of(StoredType type) {
+  return type == StoredType::kUint8 ? std::size_t{1} << 8 : std::size_t{1} << 16;
+}
 
 bool is_grey(const Colour& colour) { return colour[0] == colour[1] && colour[0] == colour[2]; }
 
@@ -47,10 +51,15 @@ void for_each_index(Bytes samples, StoredType type, Use use) {
 void Palettes::begin(const PageLayout& layout) {
   const std::uint64_t page = pages_++;
   if (!runs_.empty() && runs_.back().palette == layout.palette) return;
-  colours_ += layout.palette.size();
-  if (colours_ > kMostColours) throw_unusable("The pages have too many different palettes.");
-  runs_.push_back({.first_page = page, .palette = layout.palette, .type = layout.type});
-  if (!layout.palette.empty()) runs_.back().used.resize(kIndices);
+  const std::size_t count = layout.palette.empty() ? 0 : indices_of(layout.type);
+  indices_ += count;
+  if (indices_ > kMostIndices) {
+    throw_unusable("The pages have too many different palettes. Save them with one palette.");
+  }
+  runs_.push_back({.first_page = page,
+                   .palette = layout.palette,
+                   .used = std::vector<bool>(count),
+                   .type = layout.type});
 }
 
 void Palettes::use(std::span<const std::byte> samples) {

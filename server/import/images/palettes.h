@@ -46,7 +46,7 @@ class Palettes {
 
   std::vector<Run> runs_;
   std::uint64_t pages_ = 0;
-  std::uint64_t colours_ = 0;  // of all palettes
+  std::uint64_t indices_ = 0;  // of all palettes, used or not
 };
 
 }  // namespace isomesh::import

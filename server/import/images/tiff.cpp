@@ -161,9 +161,14 @@ StoredType type_of(TIFF* tiff, const PixelForm& form) {
 
 // The colours have 16 bits; some programs write 8.
 std::vector<Colour> palette_of(TIFF* tiff, const PixelForm& form) {
+  const StoredType type = type_of(tiff, form);
+  if (type != StoredType::kUint8 && type != StoredType::kUint16) {
+    throw_unusable(
+        "The TIFF image has a palette, but its samples are no indices: they are signed, floats, "
+        "or of more than 16 bits. Save them as a grey picture.");
+  }
   std::array<std::uint16_t*, 3> parts = {};
-  if (form.bits > 16 ||
-      TIFFGetField(tiff, TIFFTAG_COLORMAP, &parts[0], &parts[1], &parts[2]) != 1) {
+  if (TIFFGetField(tiff, TIFFTAG_COLORMAP, &parts[0], &parts[1], &parts[2]) != 1) {
     throw_damaged_tiff();
   }
   const std::size_t count = std::size_t{1} << form.bits;

@@ -334,8 +334,8 @@ void write_reordered(const StoredLattice& stored, const std::array<std::uint32_t
   }
 }
 
-std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume) {
-  const std::uint64_t expected = volume.stored_bytes();
+std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume,
+                             std::uint64_t expected) {
   const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
   if (found < expected) throw_short(expected, found);
   if (volume.has_footer) return 0;
@@ -349,8 +349,12 @@ Payload::Payload(const InputFile& file, const SourceVolume& volume,
                  const std::filesystem::path& scratch)
     : file_(file), layout_(volume.layout) {
   const bool is_raw = volume.encoding == Encoding::kRaw;
+  const auto packed = volume.packed_bytes(volume.stored_bytes());
+  if (packed && volume.data_files.empty()) {
+    const std::uint64_t bytes = trailing_bytes(file, volume, *packed);
+    if (bytes > 0) notes_.push_back(trailing_note(bytes));
+  }
   if (is_raw && volume.data_files.empty()) {
-    if (const auto bytes = trailing_bytes(file, volume)) notes_.push_back(trailing_note(bytes));
     offset_ = volume.payload.offset;
   } else if (is_raw && volume.data_files.size() == 1) {
     decoded_.emplace(volume.data_files[0].path);

@@ -16,9 +16,9 @@ namespace isomesh::import {
 // decoded from text are little-endian. x runs fastest.
 class Payload {
  public:
-  // Throws Error kUnusableVolume if the file has fewer samples than declared, or if encoded samples
-  // are more or cannot be decoded. Never writes more bytes than the declared samples have. `file`
-  // must outlive the payload.
+  // Throws Error kUnusableVolume if the file has fewer samples than declared, if they cannot be
+  // decoded, or if bytes follow that may_trail() does not allow; text and streams may have none.
+  // Never writes more bytes than the declared samples have. `file` must outlive the payload.
   Payload(const InputFile& file, const SourceVolume& volume, const std::filesystem::path& scratch);
 
   const InputFile& file() const { return decoded_ ? *decoded_ : file_; }

@@ -50,6 +50,13 @@ double millimetres_per(std::string_view unit) {
 
 }  // namespace
 
+std::optional<std::uint64_t> SourceVolume::packed_bytes(std::uint64_t decoded) const {
+  if (encoding == Encoding::kRaw) return decoded;
+  if (encoding == Encoding::kHalf) return decoded / 2;
+  if (encoding == Encoding::kBits) return decoded / 8 + (decoded % 8 > 0 ? 1 : 0);
+  return std::nullopt;
+}
+
 std::uint64_t SourceVolume::most_encoded_bytes() const {
   constexpr std::uint64_t kTextPerSample = 32;  // "-1.7976931348623157e+308" and white space
   constexpr std::uint64_t kHexPerByte = 4;
@@ -150,7 +157,8 @@ std::optional<std::string> companion_with(std::initializer_list<std::string_view
 
 bool may_trail(std::uint64_t bytes, const SourceVolume& volume) {
   constexpr std::uint64_t kBlockBytes = 4096;
-  return bytes <= kBlockBytes || bytes < volume.volume_bytes() / volume.dims[2];
+  const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
+  return bytes <= kBlockBytes || bytes < volume.packed_bytes(slice).value_or(slice);
 }
 
 Note trailing_note(std::uint64_t bytes) {
@@ -197,7 +205,9 @@ std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
         "The header skips bytes in several compressed data files, which is not supported.");
   }
   if (is_stream) volume.decoded_skip = skip.bytes;
-  const std::uint64_t part = volume.stored_bytes() / names.size();
+  const std::uint64_t decoded = volume.stored_bytes() / names.size();
+  const std::optional<std::uint64_t> packed = volume.packed_bytes(decoded);
+  const std::uint64_t part = packed.value_or(decoded);
   std::vector<DataFile> files;
   for (const std::string& name : names) {
     const std::filesystem::path& path = companion(name, companions);
@@ -211,7 +221,7 @@ std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
     if (first > size)
       throw_unusable("The data file " + in_quotes(name) + " ends before its samples begin.");
     files.push_back({path, {first, size - first}});
-    if (!is_raw || size - first == part) continue;
+    if (!packed || size - first == part) continue;
     const std::uint64_t more = size - first - std::min(size - first, part);
     if (more == 0 || names.size() > 1 || !may_trail(more, volume)) {
       throw_other_size(name, size, first + part);
@@ -269,28 +279,28 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
       std::move(choices));
 }
 
-void accept_frames(std::uint64_t frames, const ImportOptions& options, SourceVolume& volume) {
-  const std::string images = std::to_string(frames) + " flat images of " +
-                             std::to_string(volume.dims[0]) + " x " +
-                             std::to_string(volume.dims[1]) + " samples";
+void accept_frames(std::uint64_t frames, const std::string& axis, const ImportOptions& options,
+                   SourceVolume& volume) {
+  const std::string sequence = "The file is a sequence of " + std::to_string(frames) +
+                               " flat images of " + std::to_string(volume.dims[0]) + " x " +
+                               std::to_string(volume.dims[1]) + " samples along " + axis + ". ";
   if (!options.accepts(NoteCode::kFramesAsSlices)) {
     throw_overridable(NoteCode::kFramesAsSlices,
-                      "The file is a sequence of " + images +
-                          ", which follow each other in time or are a list. They do not lie side "
-                          "by side as the slices of a volume do. If accepted, they are read as "
-                          "evenly spaced slices.");
+                      sequence +
+                          "It does not say that they lie side by side as the slices of a volume "
+                          "do. If accepted, they are read as evenly spaced slices.");
   }
   volume.notes.push_back(note_of(NoteCode::kFramesAsSlices,
-                                 "The file is a sequence of " + images +
-                                     " in time or of a list. They were read as the slices of a "
-                                     "volume. The distance between them is not from a scan."));
+                                 sequence +
+                                     "They were read as the slices of a volume. The distance "
+                                     "between them is not from a scan."));
 }
 
-std::uint64_t volumes_of_frames(std::uint64_t count, const ImportOptions& options,
-                                SourceVolume& volume) {
+std::uint64_t volumes_of_frames(std::uint64_t count, const std::string& axis,
+                                const ImportOptions& options, SourceVolume& volume) {
   const auto& [x, y, z] = volume.dims;
   if (count < 2 || z != 1 || x == 1 || y == 1 || options.volume) return count;
-  accept_frames(count, options, volume);
+  accept_frames(count, axis, options, volume);
   volume.dims[2] = static_cast<std::uint32_t>(count);
   return 1;
 }

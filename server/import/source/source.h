@@ -156,6 +156,8 @@ struct SourceVolume {
   // The decoded size in the file of one volume, and of all volumes.
   std::uint64_t volume_bytes() const { return sample_count() * bytes_per_sample(layout.type); }
   std::uint64_t stored_bytes() const { return volume_bytes() * chosen.count; }
+  // The size in a file of so many decoded bytes; empty if it depends on the samples.
+  std::optional<std::uint64_t> packed_bytes(std::uint64_t decoded) const;
   // The largest encoded size, with generous white space.
   std::uint64_t most_encoded_bytes() const;
 };
@@ -217,15 +219,16 @@ std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes);
 void choose_volume(std::uint64_t count, const Difference& difference, const ImportOptions& options,
                    SourceVolume& volume);
 
-// For so many flat images that follow each other in time or are a list. Throws Error
-// kUnusableVolume, which `accept` overrides. If the options accept it, adds a note, and the images
-// are the slices of a volume.
-void accept_frames(std::uint64_t frames, const ImportOptions& options, SourceVolume& volume);
+// For so many flat images along an axis that is not one of space, such as "its axis of time".
+// Throws Error kUnusableVolume, which `accept` overrides. If the options accept it, adds a note,
+// and the images are the slices of a volume.
+void accept_frames(std::uint64_t frames, const std::string& axis, const ImportOptions& options,
+                   SourceVolume& volume);
 
 // The same if the volumes of the file are flat images, which have `volume.dims`, and the options
 // select none. Returns how many volumes are left: one, whose slices they are, or `count`.
-std::uint64_t volumes_of_frames(std::uint64_t count, const ImportOptions& options,
-                                SourceVolume& volume);
+std::uint64_t volumes_of_frames(std::uint64_t count, const std::string& axis,
+                                const ImportOptions& options, SourceVolume& volume);
 
 // The words, with a space before them, between the reason of an error and the parameter of a client
 // that resolves it: `verb`, such as "Add". An order has no such parameter, so its series must be

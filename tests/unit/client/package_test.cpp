@@ -103,6 +103,14 @@ TEST(UploadBody, LinksInAFolderAreFollowed) {
   EXPECT_THAT(names_of(folder / ""), ElementsAre("sub/a.nii", "sub/more/X2"));
 }
 
+// As Emacs marks a file that is open.
+TEST(UploadBody, HiddenLinksToNothingAreSkipped) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "a.nii", "one");
+  fs::create_symlink("someone@host.1234:5678", folder / ".#notes.txt");
+  EXPECT_THAT(names_of(folder / ""), ElementsAre("a.nii"));
+}
+
 TEST(UploadBody, LinksToNothingAndLoopsAreNamed) {
   const test::TemporaryFolder folder;
   const auto fault = [&](const char* name) {

@@ -12,8 +12,10 @@
 namespace isomesh::import::test {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 using Vector = std::array<double, 3>;
 using Matrix = std::array<double, 9>;
 
@@ -45,6 +47,31 @@ TEST(Mif, AxesMayBeStoredInAnyOrder) {
   EXPECT_EQ(outcome.sample_bytes(), right);
 }
 
+// A layout that is not its own inverse: y varies fastest, then z.
+TEST(Mif, ALayoutGivesEachAxisItsRank) {
+  std::string right;
+  for (std::size_t z = 0; z < 2; ++z) {
+    for (std::size_t y = 0; y < 3; ++y) {
+      for (std::size_t x = 0; x < 4; ++x) right += kSamples[(x * 2 + z) * 3 + y];
+    }
+  }
+  EXPECT_EQ(imported(import_bytes(mif({.layout = "+2,+0,+1"}, kSamples))).sample_bytes(), right);
+}
+
+// As MRtrix places them, also with an odd number of reversed axes.
+TEST(Mif, AxesWithoutATransformAreThoseOfRas) {
+  const MifFields fields = {.layout = "-0,+1,+2", .transform = ""};
+  const Outcome outcome = imported(import_bytes(mif(fields, kSamples)));
+  EXPECT_EQ(outcome.sample_bytes(), kSamples);
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{2, 3, 4}));
+  EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3 * 2, 0, 0}));
+  EXPECT_EQ(outcome.volume.geometry.direction, (Matrix{1, 0, 0, 0, -1, 0, 0, 0, 1}));
+  EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("RAS"));
+  EXPECT_THAT(import_bytes(mif({.transform = "transform: 1,0,0,0\n"}, kSamples)).error,
+              HasSubstr("1 line of three"));
+}
+
 TEST(Mif, VolumesMayTakeTurns) {
   const auto second = [](const std::string& layout) {
     const MifFields fields = {.dim = "2,3,2,2", .layout = layout};
@@ -55,6 +82,13 @@ TEST(Mif, VolumesMayTakeTurns) {
   EXPECT_EQ(second("+0,+1,+2,+3"), "mnopqrstuvwx");
   EXPECT_EQ(second("+1,+2,+3,+0"), "bdfhjlnprtvx");
   EXPECT_EQ(second("+0,+1,+2,-3"), "abcdefghijkl");
+}
+
+TEST(Mif, SeveralAxesBeyondSpaceAreRefusedAtOnce) {
+  const MifFields fields = {.dim = "1,3,2,2,2", .layout = "+0,+1,+2,+3,+4"};
+  const Outcome refused = import_bytes(mif(fields, kSamples));
+  EXPECT_TRUE(refused.remedy.choices.empty());
+  EXPECT_THAT(refused.error, HasSubstr("mrconvert IN -coord 4 0 OUT"));
 }
 
 TEST(Mif, ScalingByteOrderAndDataFilesAreRead) {
@@ -81,6 +115,28 @@ TEST(Mif, BitsAndHalfFloatsAreRead) {
   EXPECT_EQ(samples_of<float>(imported(
                 import_bytes(mif({.dim = "2,2,2", .datatype = "Float16LE"}, bytes_of(halves))))),
             (std::vector<float>{1, -2.5F, 0, 0, 0, 0, 0, 0}));
+}
+
+TEST(Mif, BytesBehindPackedSamplesAreToldOrRefused) {
+  const MifFields bits = {.dim = "3,2,2", .datatype = "Bit"};
+  const MifFields halves = {.dim = "2,3,2", .datatype = "Float16LE"};
+  const auto expect_told = [](const MifFields& fields, const std::string& samples) {
+    const std::string file = mif(fields, samples + "more");
+    MifFields apart = fields;
+    apart.file = "a.dat";
+    for (const std::string& bytes :
+         {file, zip({{"a.mih", mif(apart, "")}, {"a.dat", samples + "more"}})}) {
+      const Outcome outcome = imported(import_bytes(bytes));
+      EXPECT_THAT(codes_of(outcome), Contains("trailing-bytes"));
+      EXPECT_THAT(outcome.volume.notes.at(0).detail, HasSubstr("4 bytes longer"));
+    }
+    EXPECT_THAT(import_bytes(mif(fields, samples + std::string(5000, 'm'))).error,
+                HasSubstr("more than the " + std::to_string(samples.size()) + " bytes"));
+    EXPECT_THAT(codes_of(imported(import_bytes(mif(fields, samples)))),
+                Not(Contains("trailing-bytes")));
+  };
+  expect_told(bits, "\x4b\x90");
+  expect_told(halves, std::string(24, '\0'));
 }
 
 TEST(Mif, DamagedAndUnsupportedOnesAreNamed) {

@@ -233,13 +233,30 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
 TEST(Nifti, OfFlatImagesInTimeIsNoVolume) {
   const std::string file = nifti({.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, kSmallSamples);
   const Outcome refused = import_bytes(file);
-  EXPECT_THAT(refused.error, HasSubstr("a sequence of 2 flat images of 4 x 3 samples"));
+  EXPECT_THAT(refused.error,
+              HasSubstr("a sequence of 2 flat images of 4 x 3 samples along its fourth "
+                        "dimension, time."));
   EXPECT_EQ(refused.remedy.overridable, "frames-as-slices");
   const Outcome accepted = imported(import_bytes(file, {}, {.accept = {"frames-as-slices"}}));
   EXPECT_EQ(accepted.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
   EXPECT_EQ(accepted.sample_bytes(), kSmallSamples);
   EXPECT_THAT(codes_of(accepted), testing::ElementsAre("frames-as-slices"));
   EXPECT_THAT(import_bytes(file, {}, {.volume = 1}).error, HasSubstr("flat image"));
+}
+
+TEST(Nifti, FlatImagesOfValuesAreNoInstants) {
+  const NiftiFields fields = {.dim = {5, 4, 3, 1, 1, 2, 1, 1}};
+  const Outcome refused = import_bytes(nifti(fields, kSmallSamples));
+  EXPECT_THAT(refused.error,
+              AllOf(HasSubstr("along its fifth dimension, of values"), Not(HasSubstr("time"))));
+  EXPECT_EQ(refused.remedy.overridable, "frames-as-slices");
+  // A flat field of vectors, NIFTI_INTENT_VECTOR.
+  std::string vectors = nifti(fields, kSmallSamples);
+  vectors.replace(68, 2, bytes_of(std::vector<std::int16_t>{1007}));
+  const Outcome field = import_bytes(vectors);
+  EXPECT_THAT(field.error, HasSubstr("flat image"));
+  EXPECT_EQ(field.remedy.overridable, "");
+  EXPECT_TRUE(field.remedy.choices.empty());
 }
 
 TEST(Nifti, PassesOverDimensionsOfOne) {

@@ -244,6 +244,20 @@ TEST(Nrrd, OfFlatImagesInTimeIsNoVolume) {
   EXPECT_EQ(import_bytes(tracked).remedy.overridable, "frames-as-slices");
 }
 
+TEST(Nrrd, FlatImagesAreToldByTheirAxis) {
+  const Lines flat = with(small_nrrd(), "space directions", "(1,0,0) (0,1,0) none");
+  const auto refused = [&](const char* kinds) { return import_nrrd(with(flat, "kinds", kinds)); };
+  EXPECT_THAT(refused("domain domain time").error, HasSubstr("along its axis of time."));
+  EXPECT_THAT(refused("domain domain list").error, HasSubstr("along its axis of a list."));
+  Lines fourth = with(with(flat, "dimension", "4"), "sizes", "4 3 1 2");
+  fourth = with(fourth, "space directions", "(1,0,0) (0,1,0) (0,0,5) none");
+  EXPECT_THAT(import_nrrd(fourth).error, HasSubstr("along its axis 4, beyond the three of space."));
+  const Outcome vectors = refused("domain domain vector");
+  EXPECT_THAT(vectors.error, HasSubstr("flat image"));
+  EXPECT_EQ(vectors.remedy.overridable, "");
+  EXPECT_TRUE(vectors.remedy.choices.empty());
+}
+
 TEST(Nrrd, TakesASingleComponentForNone) {
   Lines lines = with(small_nrrd(), "dimension", "4");
   lines = with(lines, "sizes", "1 4 3 2");

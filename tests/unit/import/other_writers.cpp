@@ -107,8 +107,7 @@ std::string isq(const IsqFields& fields, std::string_view samples) {
 std::string mif(const MifFields& fields, std::string_view samples) {
   const std::string header = "mrtrix image\ndim: " + fields.dim +
                              "\nvox: 2,3,4,nan\nlayout: " + fields.layout +
-                             "\ndatatype: " + fields.datatype + "\n" +
-                             "transform: 1,0,0,10\ntransform: 0,1,0,20\ntransform: 0,0,1,30\n" +
+                             "\ndatatype: " + fields.datatype + "\n" + fields.transform +
                              "command_history: x: y\n" + fields.more;
   if (!fields.file.empty()) return header + "file: " + fields.file + "\nEND\n";
   constexpr std::size_t kOffset = 512;

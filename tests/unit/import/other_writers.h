@@ -74,6 +74,7 @@ struct MifFields {
   std::string datatype = "UInt8";
   std::string more = {};
   std::string file = {};  // empty: behind the header
+  std::string transform = "transform: 1,0,0,10\ntransform: 0,1,0,20\ntransform: 0,0,1,30\n";
 };
 std::string mif(const MifFields& fields, std::string_view samples);
 

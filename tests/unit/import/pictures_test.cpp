@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/import/images/palettes.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/writers.h"
@@ -95,6 +96,33 @@ TEST(Pictures, GreyPalettesAreGreyPictures) {
         << name;
     EXPECT_TRUE(outcome.volume.labels.empty()) << name;
   }
+}
+
+TEST(Pictures, OnlyUnsignedIntegersAreIndices) {
+  const auto error = [](PictureFields fields, std::uint16_t format, std::size_t bytes) {
+    fields.format = format;
+    const std::string page = tiff_picture(fields, {std::string(6 * bytes, '\1')});
+    return stack(page, page).error;
+  };
+  PictureFields wide = kLabels;
+  wide.bits = 16;
+  EXPECT_EQ(error(wide, 1, 2), "");
+  for (const auto& each : {error(kLabels, 2, 1), error(wide, 2, 2), error(wide, 3, 2)}) {
+    EXPECT_THAT(each, HasSubstr("no indices"));
+  }
+}
+
+// Each palette costs the flags of all indices, however few its colours are.
+TEST(Pictures, ManyPalettesAreRefused) {
+  constexpr std::size_t kMostPalettes = (std::size_t{1} << 23) / 256;
+  Palettes palettes;
+  PageLayout layout = {1, 1, StoredType::kUint8};
+  for (std::size_t at = 0; at < kMostPalettes; ++at) {
+    layout.palette = at % 2 == 0 ? std::vector<Colour>{{0, 0, 0}} : std::vector<Colour>{{1, 0, 0}};
+    ASSERT_NO_THROW(palettes.begin(layout)) << at;
+  }
+  layout.palette = {{0, 1, 0}};
+  EXPECT_THROW(palettes.begin(layout), Error);
 }
 
 // Pseudo-colours of a picture with many values are no labels.

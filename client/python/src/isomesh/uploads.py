@@ -110,6 +110,8 @@ def _files_below(folder: Path) -> List[Tuple[str, Path]]:
             if file.name == ".git":  # the objects of a dataset, which the links beside it name
                 continue
             if file.is_symlink() and not file.exists():
+                if file.name.startswith("."):  # editors mark a file that is open so (.#name)
+                    continue
                 raise FileNotFoundError(
                     f"{file} is a link to a file that is not there; get the file, in a dataset with 'datalad get', "
                     "or remove the link"
