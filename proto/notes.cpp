@@ -155,6 +155,10 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning = "The labels have more than 32 bits. The samples have other numbers; lists, names "
                 "and meshes have the file's.",
      .is_in_mesh = true},
+    {.code = NoteCode::kChunksMissing,
+     .name = "chunks-missing",
+     .meaning = "Some chunks of a Zarr array are missing. Their samples have the fill value.",
+     .is_in_mesh = true},
 };
 
 }  // namespace

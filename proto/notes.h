@@ -37,6 +37,7 @@ enum class NoteCode {
   kRescaleIgnored,        // an offset that does not apply by the standard; others add it
   kLabelsRounded,         // labels as floats that are nearly whole; rounded
   kLabelsRenumbered,      // labels of more than 32 bits; the samples have other numbers
+  kChunksMissing,         // Zarr: some chunks are not there; their samples have the fill value
 };
 
 struct NoteDescription {

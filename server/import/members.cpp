@@ -15,6 +15,7 @@
 #include "proto/volume_formats.h"
 #include "server/import/archives/archive.h"
 #include "server/import/dicom/import.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/images/natural_order.h"
 #include "server/import/images/stack.h"
 #include "server/import/labels_beside.h"
@@ -37,15 +38,16 @@ ArchiveLimits limits_of(const SizeLimits& limits) {
   return {.max_bytes = limits.max_sample_bytes + kHeadroomBytes};
 }
 
-// Slices and pages are always needed. For others this is not known yet; nor is the size of data
-// files.
+// Slices and pages are always needed, and a Zarr's metadata name its data. For others this is not
+// known yet; nor is the size of data files.
 std::optional<std::uint64_t> most_of_slice(const std::filesystem::path& beginning,
                                            const ImportTask& task) {
   const InputFile file(beginning);
   const Reader* reader = sniff(file);
-  const bool is_part = reader != nullptr &&
-                       (reader->content == Content::kSlices || reader->content == Content::kPages);
-  if (!is_part) return std::nullopt;
+  const bool is_needed =
+      reader != nullptr && (reader->content == Content::kSlices ||
+                            reader->content == Content::kPages || reader->name == kZarrReader.name);
+  if (!is_needed) return std::nullopt;
   return most_bytes_of(*reader, file, task).file;
 }
 

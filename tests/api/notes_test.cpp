@@ -163,6 +163,15 @@ std::string nearly_whole() {
   return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(labels));
 }
 
+// Two chunks, the second of which is missing.
+Files sparse_zarr() {
+  return {
+      {".zattrs", R"({"multiscales": [{"axes": ["z", "y", "x"], "datasets": [{"path": "0"}]}]})"},
+      {"0/.zarray", R"({"zarr_format": 2, "shape": [2, 3, 4], "chunks": [1, 3, 4], "dtype": "|u1",)"
+                    R"( "order": "C", "fill_value": 0, "compressor": null})"},
+      {"0/0.0.0", kSamples.substr(0, 12)}};
+}
+
 // By the note's name, so that whoever adds a note adds how it is shown.
 const std::map<std::string, Shown>& shown() {
   static const std::map<std::string, Shown> all = {
@@ -199,6 +208,7 @@ const std::map<std::string, Shown>& shown() {
       {"fractional-segments", {{{"a.dcm", fractional_segmentation()}}}},
       {"contours-skipped", {structures_and_images(), {"--series", "1.2.9"}}},
       {"contours-interpolated", {structures_and_images(), {"--series", "1.2.9"}}},
+      {"chunks-missing", {sparse_zarr()}},
       {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
       {"padding", {{{"1", padded_slice(1)}, {"2", padded_slice(2)}}}},
       {"distance-assumed", {{{"a.dcm", mosaic()}}}},
@@ -223,7 +233,10 @@ class NotesTest : public testing::Test {
   // Uploads the files with the command, as a folder where there are several.
   Finished upload_files(const Shown& what, const std::string& folder) {
     std::filesystem::create_directories(folder_ / folder);
-    for (const auto& [name, bytes] : what.files) write_file(folder_ / folder / name, bytes);
+    for (const auto& [name, bytes] : what.files) {
+      std::filesystem::create_directories((folder_ / folder / name).parent_path());
+      write_file(folder_ / folder / name, bytes);
+    }
     const auto path = folder_ / folder;
     return daemon_.command(
         with({"--json", "upload", what.files.size() == 1 ? path / what.files.begin()->first : path},

@@ -12,6 +12,7 @@
 #include "tests/unit/import/pictures.h"
 #include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
+#include "tests/unit/import/zarr_files.h"
 
 namespace isomesh::fuzz {
 namespace {
@@ -199,6 +200,21 @@ std::vector<std::string> other_files(std::string_view name) {
   return {};
 }
 
+// Their codecs are transposed axes, shards, Zstandard, Blosc and checksums.
+std::vector<std::string> zarr_archives() {
+  using namespace import::test::zarr;
+  const std::string turned =
+      R"({"name": "transpose", "configuration": {"order": [2, 1, 0]}}, "bytes", )";
+  const auto summed = [](const std::string& chunk) { return with_sum(zarr::zstd(chunk)); };
+  const auto packed = [](const std::string& chunk) { return blosc(chunk, "lz4", BLOSC_SHUFFLE); };
+  const auto shards = [](const std::string& chunk) {
+    return chunk + bytes_of(std::vector<std::uint64_t>{0, 4, 4, 4});
+  };
+  return {tar(zarr_3(turned + R"("zstd", "crc32c")", summed, true)),
+          tar(zarr_3(turned + "\"blosc\"", packed, true)),
+          tar(zarr_3(sharding("\"bytes\""), shards))};
+}
+
 std::vector<std::string> archive_files() {
   const std::string mhd = metaimage(with(small_metaimage(), "ElementDataFile", "a.raw"), "");
   const std::string nhdr = nrrd(with(small_nrrd(), "data file", "a.raw"), "");
@@ -264,7 +280,11 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "structures") return structure_sets();
   if (name == "ascconv") return siemens_protocols();
   if (name == "csa") return csa_headers();
-  if (name == "archive") return archive_files();
+  if (name == "archive") {
+    std::vector<std::string> files = archive_files();
+    for (const std::string& file : zarr_archives()) files.push_back(file);
+    return files;
+  }
   if (name == "labels") return label_texts();
   if (name == "raw") return raw_files();
   if (name == "canonical") return canonical_files();

@@ -1,11 +1,8 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
-#include <functional>
-#include <map>
-#include <numeric>
-#include <optional>
+#include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,9 +10,8 @@
 #include "base/text.h"
 #include "proto/json_text.h"
 #include "server/import/formats/format_readers.h"
-#include "server/import/formats/placing.h"
 #include "server/import/formats/zarr_array.h"
-#include "server/import/labels/label_table.h"
+#include "server/import/formats/zarr_meaning.h"
 #include "server/import/samples/transfer.h"
 
 namespace isomesh::import {
@@ -24,206 +20,94 @@ namespace {
 constexpr std::uint64_t kMostChunks = 1'000'000;  // of a volume
 constexpr std::size_t kMostDatasets = 64;
 
-const Json& at(const Json& json, const char* name) {
-  static const Json null;
-  if (!json.is_object()) return null;
-  const auto found = json.find(name);
-  return found == json.end() ? null : *found;
-}
+// Looks for a group's own `multiscales` or `image-label`, also in the beginning of a file.
+// Consolidated metadata repeat those of groups below it.
+class OwnKeys : public nlohmann::json_sax<Json> {
+ public:
+  bool found() const { return found_; }
 
-std::string word(const Json& json) { return json.is_string() ? json.get<std::string>() : ""; }
+  bool start_object(std::size_t /*elements*/) override { return descend(true); }
+  bool start_array(std::size_t /*elements*/) override { return descend(false); }
+  bool end_object() override { return ascend(); }
+  bool end_array() override { return ascend(); }
 
-// The group's metadata of OME: 0.5 has it below attributes of a `zarr.json`.
-const Json& ome_of(const Json& group) {
-  const Json& attributes = at(group, "attributes");
-  return attributes.is_null() ? group : at(attributes, "ome");
-}
+  bool key(string_t& name) override {
+    if (path_.empty()) return false;
+    path_.back() = name;
+    const bool is_here =
+        path_.size() == 1 || (path_.size() == 3 && path_[0] == "attributes" && path_[1] == "ome");
+    found_ = is_here && (name == "multiscales" || name == "image-label");
+    return !found_;
+  }
 
-bool has_key(std::string_view head, std::string_view key) {
-  return head.find('"' + std::string(key) + '"') != std::string_view::npos;
-}
+  bool null() override { return true; }
+  bool boolean(bool /*value*/) override { return true; }
+  bool number_integer(number_integer_t /*value*/) override { return true; }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return true; }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return true; }
+  bool string(string_t& /*value*/) override { return true; }
+  bool binary(binary_t& /*value*/) override { return true; }
+  bool parse_error(std::size_t /*place*/, const std::string& /*token*/,
+                   const nlohmann::detail::exception& /*fault*/) override {
+    return false;
+  }
 
-// Consolidated metadata repeat those of all groups.
+ private:
+  bool descend(bool is_object) {
+    if (path_.empty() && !is_object) return false;
+    path_.emplace_back();
+    return true;
+  }
+
+  bool ascend() {
+    path_.pop_back();
+    return true;
+  }
+
+  bool found_ = false;
+  std::vector<std::string> path_;  // the keys of the open objects; empty for arrays
+};
+
 bool is_zarr(std::string_view head) {
-  return trimmed(head.substr(0, 64)).starts_with('{') &&
-         (has_key(head, "multiscales") || has_key(head, "image-label")) &&
-         !has_key(head, ".zgroup") && !has_key(head, ".zattrs");
+  if (!trimmed(head.substr(0, 64)).starts_with('{')) return false;
+  OwnKeys keys;
+  Json::sax_parse(head, &keys, Json::input_format_t::json, false);
+  return keys.found();
 }
 
 std::vector<std::string> dataset_paths(const Json& scales) {
   std::vector<std::string> paths;
-  const Json& datasets = at(scales, "datasets");
+  const Json& datasets = zarr_member(scales, "datasets");
   if (!datasets.is_array()) return paths;
   for (const Json& dataset : datasets) {
-    if (paths.size() < kMostDatasets) paths.push_back(word(at(dataset, "path")));
+    if (paths.size() < kMostDatasets) paths.push_back(zarr_text(zarr_member(dataset, "path")));
   }
   return paths;
 }
 
 const Json& scales_of(const Json& group) {
-  const Json& scales = at(ome_of(group), "multiscales");
+  const Json& scales = zarr_member(zarr_ome(group), "multiscales");
   if (!scales.is_array() || scales.empty() || dataset_paths(scales[0]).empty()) {
     throw_unusable("The OME-Zarr's metadata has no multiscales with datasets.");
   }
   return scales[0];
 }
 
-// Everything in the arrays' folders, and metadata that no note should list.
+// Everything in the arrays' folders, and metadata that no note should list. Only the metadata of a
+// group have them, so files of an archive are not asked for again and again.
 std::vector<std::string> zarr_data_names(const InputFile& file, const Companions& companions) {
+  if (companions.name() != ".zattrs" && companions.name() != "zarr.json") return {};
   const Json group = parse_json<Json>(file.text(0, kMostZarrHeaderBytes), nullptr, false);
-  std::vector<std::string> paths;
-  for (const Json& scales : at(ome_of(group), "multiscales")) {
-    for (const std::string& path : dataset_paths(scales)) paths.push_back(path + "/");
+  std::set<std::string> names;
+  const std::vector<std::string> paths = dataset_paths(scales_of(group));
+  for (const std::string& path : std::set(paths.begin(), paths.end())) {
+    names.merge(companions.below(path));
   }
-  constexpr std::array<std::string_view, 6> kBeside = {".zgroup",          ".zattrs",
-                                                       "labels/.zattrs",   "labels/.zgroup",
-                                                       "labels/zarr.json", "OME/METADATA.ome.xml"};
-  std::vector<std::string> names;
-  for (const auto& [name, path] : companions.all()) {
-    const bool is_of_array = std::ranges::any_of(
-        paths, [&](const std::string& folder) { return name.starts_with(folder); });
-    const bool is_beside =
-        name != companions.name() && std::ranges::find(kBeside, name) != kBeside.end();
-    if (is_of_array || is_beside) names.push_back(name);
+  for (const char* name : {".zgroup", ".zattrs", "labels/.zattrs", "labels/.zgroup",
+                           "labels/zarr.json", "OME/METADATA.ome.xml"}) {
+    if (companions.find(name) != nullptr) names.insert(name);
   }
-  return names;
-}
-
-// --- Axes and places -----------------------------------------------------------------------------
-
-struct ZarrAxis {
-  std::string name = {};
-  std::string type = {};
-  std::string unit = {};
-  std::string orientation = {};
-};
-
-std::vector<ZarrAxis> axes_of(const Json& scales, std::size_t count) {
-  std::vector<ZarrAxis> axes;
-  const Json& listed = at(scales, "axes");
-  if (listed.is_null() && count == 5) {
-    for (const char* name : {"t", "c", "z", "y", "x"}) axes.push_back({.name = name});
-  }
-  if (listed.is_array() && listed.size() <= ZarrArray::kMostAxes) {
-    for (const Json& axis : listed) {
-      if (axis.is_string()) axes.push_back({.name = word(axis)});
-      if (!axis.is_object()) continue;
-      axes.push_back({word(at(axis, "name")), word(at(axis, "type")), word(at(axis, "unit")),
-                      word(at(at(axis, "orientation"), "value"))});
-    }
-  }
-  if (axes.size() != count) {
-    throw_unusable("The OME-Zarr's metadata does not name the " + std::to_string(count) +
-                   " axes of its array.");
-  }
-  return axes;
-}
-
-bool is_spatial(const ZarrAxis& axis) {
-  if (!axis.type.empty()) return axis.type == "space";
-  return axis.name == "x" || axis.name == "y" || axis.name == "z";
-}
-
-// The array's axes of x, y and z: the fastest of space is x, unless they have these names.
-std::array<std::size_t, 3> spatial_axes(const std::vector<ZarrAxis>& axes) {
-  std::vector<std::size_t> found;
-  for (std::size_t axis = axes.size(); axis-- > 0;) {
-    if (is_spatial(axes[axis])) found.push_back(axis);
-  }
-  if (found.size() != 3) {
-    throw_unusable("The OME-Zarr has " + std::to_string(found.size()) +
-                   " axes of space. A volume has three.");
-  }
-  std::array<std::size_t, 3> named = {found[0], found[1], found[2]};
-  constexpr std::string_view kNames = "xyz";
-  std::array<bool, 3> seen = {};
-  for (const std::size_t axis : found) {
-    const std::size_t place = axes[axis].name.size() == 1 ? kNames.find(axes[axis].name) : 3;
-    if (place >= 3 || seen[place]) return {found[0], found[1], found[2]};
-    seen[place] = true;
-    named[place] = axis;
-  }
-  return named;
-}
-
-struct Line {
-  std::vector<double> scale;
-  std::vector<double> translation;
-};
-
-// The transformations of one list, on top of `line`.
-void apply(const Json& transformations, Line& line) {
-  if (!transformations.is_array()) return;
-  for (const Json& each : transformations) {
-    const std::string type = word(at(each, "type"));
-    if (type == "identity") continue;
-    const bool is_scale = type == "scale";
-    const Json& numbers = at(each, type.c_str());
-    if ((!is_scale && type != "translation") || !numbers.is_array() ||
-        numbers.size() != line.scale.size()) {
-      throw_unusable("The OME-Zarr's transformation " + in_quotes(type) +
-                     " is not supported. A scale and a translation are.");
-    }
-    for (std::size_t axis = 0; axis < line.scale.size(); ++axis) {
-      const double number = numbers[axis].is_number() ? numbers[axis].get<double>() : std::nan("");
-      if (!std::isfinite(number)) throw_unusable("The OME-Zarr's scale or translation is damaged.");
-      if (is_scale) line.scale[axis] *= number;
-      line.translation[axis] =
-          is_scale ? line.translation[axis] * number : line.translation[axis] + number;
-    }
-  }
-}
-
-double millimetres_of(const std::string& unit, std::vector<Note>& notes) {
-  Geometry one;
-  scale_to_millimetres(one, unit, notes);
-  return one.spacing[0];
-}
-
-// The direction in which an axis grows, in LPS. Empty if the file does not say it.
-std::optional<Vector3> direction_of(const std::string& orientation) {
-  static const std::map<std::string, Vector3, std::less<>> kDirections = {
-      {"right-to-left", {1, 0, 0}},         {"left-to-right", {-1, 0, 0}},
-      {"anterior-to-posterior", {0, 1, 0}}, {"posterior-to-anterior", {0, -1, 0}},
-      {"inferior-to-superior", {0, 0, 1}},  {"superior-to-inferior", {0, 0, -1}}};
-  const auto found = kDirections.find(orientation);
-  return found == kDirections.end() ? std::nullopt : std::optional(found->second);
-}
-
-void set_geometry(const Json& scales, const std::vector<ZarrAxis>& axes,
-                  const std::array<std::size_t, 3>& spatial, SourceVolume& source) {
-  Line line = {std::vector<double>(axes.size(), 1), std::vector<double>(axes.size(), 0)};
-  apply(at(at(scales, "datasets")[0], "coordinateTransformations"), line);
-  apply(at(scales, "coordinateTransformations"), line);
-  Geometry& geometry = source.geometry;
-  std::array<Vector3, 3> directions = {Vector3{1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, 0, 1}};
-  bool is_placed = true;
-  for (std::size_t each = 0; each < 3; ++each) {
-    const auto direction = direction_of(axes[spatial[each]].orientation);
-    if (direction) directions[each] = *direction;
-    is_placed &= direction.has_value();
-  }
-  if (!is_placed) {
-    directions = {Vector3{1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, 0, 1}};
-    source.notes.push_back(lps_assumed("An OME-Zarr"));
-  }
-  geometry.origin = {0, 0, 0};
-  bool has_units = true;
-  for (std::size_t each = 0; each < 3; ++each) {
-    const ZarrAxis& axis = axes[spatial[each]];
-    has_units &= !axis.unit.empty();
-    const double unit = millimetres_of(axis.unit, source.notes);
-    geometry.spacing[each] = line.scale[spatial[each]] * unit;
-    for (std::size_t row = 0; row < 3; ++row) {
-      geometry.direction[row * 3 + each] = directions[each][row];
-      geometry.origin[row] += directions[each][row] * line.translation[spatial[each]] * unit;
-    }
-  }
-  if (!has_units) {
-    source.notes.push_back(note_of(
-        NoteCode::kUnitUnknown,
-        "The OME-Zarr does not say the unit of its axes. One unit was read as one millimetre."));
-  }
+  return {names.begin(), names.end()};
 }
 
 // --- Volumes -------------------------------------------------------------------------------------
@@ -289,14 +173,11 @@ class ChunkWriter {
  public:
   ChunkWriter(const ZarrArray& array, const std::array<std::size_t, 3>& spatial,
               std::span<std::byte> samples)
-      : array_(array), spatial_(spatial), samples_(samples), bytes_(array.fill.size()) {
-    strides_.resize(array.chunk.size());
-    std::uint64_t stride = 1;
-    for (std::size_t each = array.order.size(); each-- > 0;) {
-      strides_[array.order[each]] = stride;
-      stride *= array.chunk[array.order[each]];
-    }
-  }
+      : array_(array),
+        spatial_(spatial),
+        samples_(samples),
+        bytes_(array.fill.size()),
+        strides_(array.strides()) {}
 
   // `place` is the first sample of the chunk within the volume's; `chunk` is empty if it is
   // missing.
@@ -344,10 +225,14 @@ class ChunkWriter {
   std::vector<std::uint64_t> strides_;  // of the axes in a chunk, in samples
 };
 
-void write_chunks(const ZarrArray& array, const std::string& path,
-                  const std::array<std::size_t, 3>& spatial, std::vector<std::uint64_t> place,
-                  const Companions& companions, std::span<std::byte> samples) {
-  std::array<std::uint64_t, 3> counts = {};
+using Counts = std::array<std::uint64_t, 3>;
+
+// The chunks of a volume along x, y and z. Throws Error kUnusableVolume if they are far larger than
+// the volume can be, because each is decoded as a whole.
+Counts chunk_counts(const ZarrArray& array, const std::array<std::size_t, 3>& spatial,
+                    const SizeLimits& limits) {
+  constexpr std::uint64_t kMostPerByte = 4;
+  Counts counts = {};
   std::uint64_t all = 1;
   for (std::size_t each = 0; each < 3; ++each) {
     const std::size_t axis = spatial[each];
@@ -357,7 +242,22 @@ void write_chunks(const ZarrArray& array, const std::string& path,
     }
     all *= counts[each];
   }
+  const std::uint64_t bytes = all * array.chunk_samples() * array.fill.size();
+  if (all > 1 && bytes / kMostPerByte > limits.max_sample_bytes) {
+    throw_unusable("The OME-Zarr's chunks hold " + std::to_string(bytes) +
+                   " bytes for one volume, which is too many. Write it with chunks that do not "
+                   "reach beyond a volume.");
+  }
+  return counts;
+}
+
+// Writes the volume that begins at `place`, with a note if chunks are missing.
+void write_chunks(const ZarrArray& array, const std::string& path,
+                  const std::array<std::size_t, 3>& spatial, std::vector<std::uint64_t> place,
+                  const Counts& counts, const Companions& companions, std::span<std::byte> samples,
+                  std::vector<Note>& notes) {
   const ChunkWriter writer(array, spatial, samples);
+  const std::uint64_t all = counts[0] * counts[1] * counts[2];
   std::uint64_t found = 0;
   for (std::uint64_t next = 0; next < all; ++next) {
     std::uint64_t rest = next;
@@ -373,52 +273,15 @@ void write_chunks(const ZarrArray& array, const std::string& path,
     writer.write(place, file == nullptr ? std::vector<std::byte>() : decode_chunk(array, *file));
     found += file != nullptr ? 1 : 0;
   }
-  if (found > 0) return;
-  throw_unusable("The OME-Zarr has no chunk of " + in_quotes(path) +
-                 ". Upload the whole folder with the hidden files, or a ZIP of it.");
-}
-
-// --- Labels --------------------------------------------------------------------------------------
-
-LabelEntry& entry_for(std::int64_t label, std::map<std::int64_t, LabelEntry>& entries) {
-  LabelEntry& entry = entries[label];
-  entry.label = label;
-  return entry;
-}
-
-// Names and colours of `image-label`; its values are labels even without them.
-void set_labels(const Json& group, SourceVolume& source) {
-  const Json& described = at(ome_of(group), "image-label");
-  if (!described.is_object()) return;
-  source.are_labels = true;
-  std::map<std::int64_t, LabelEntry> entries;
-  const auto for_each = [&](const char* list, const auto& use) {
-    const Json& items = at(described, list);
-    if (!items.is_array() || items.size() > Volume::kMostLabels) return;
-    for (const Json& item : items) {
-      const Json& value = at(item, "label-value");
-      if (!value.is_number_integer() || value.get<std::int64_t>() == 0) continue;
-      use(item, entry_for(value.get<std::int64_t>(), entries));
-    }
-  };
-  for_each("colors", [](const Json& item, LabelEntry& entry) {
-    const Json& rgba = at(item, "rgba");
-    if (!rgba.is_array() || rgba.size() < 3) return;
-    std::array<double, 3> color = {};
-    for (std::size_t part = 0; part < 3; ++part) {
-      if (!rgba[part].is_number_unsigned()) return;
-      color[part] = rgba[part].get<double>() / 255;
-    }
-    entry.color = label_color(color);
-  });
-  for_each("properties", [](const Json& item, LabelEntry& entry) {
-    for (const char* name : {"name", "label", "class"}) {
-      if (entry.name.empty()) entry.name = label_name(word(at(item, name)));
-    }
-  });
-  std::vector<LabelEntry> labels;
-  for (auto& [label, entry] : entries) labels.push_back(std::move(entry));
-  source.labels = label_table(std::move(labels));
+  if (found == 0) {
+    throw_unusable("The OME-Zarr has no chunk of " + in_quotes(path) +
+                   ". Upload the whole folder with the hidden files, or a ZIP of it.");
+  }
+  if (found == all) return;
+  notes.push_back(note_of(NoteCode::kChunksMissing,
+                          std::to_string(all - found) + " of " + std::to_string(all) +
+                              " chunks of the OME-Zarr are missing. Their samples have the fill "
+                              "value. Some programs leave out chunks that have no other value."));
 }
 
 // --- Reading -------------------------------------------------------------------------------------
@@ -450,8 +313,8 @@ Volume parse_zarr(const Input& input) {
   const Json& scales = scales_of(group);
   const std::string path = dataset_paths(scales).front();
   const ZarrArray array = array_of(path, input.companions);
-  const std::vector<ZarrAxis> axes = axes_of(scales, array.shape.size());
-  const std::array<std::size_t, 3> spatial = spatial_axes(axes);
+  const std::vector<ZarrAxis> axes = zarr_axes(scales, array.shape.size());
+  const std::array<std::size_t, 3> spatial = zarr_spatial_axes(axes);
   SourceVolume source;
   source.dims = volume_dims(std::array<std::uint64_t, 3>{
       array.shape[spatial[0]], array.shape[spatial[1]], array.shape[spatial[2]]});
@@ -463,13 +326,15 @@ Volume parse_zarr(const Input& input) {
   std::vector<std::uint64_t> place(array.shape.size());
   beyond.set(source.chosen.index, place);
   source.chosen = {};
-  set_geometry(scales, axes, spatial, source);
-  set_labels(group, source);
+  set_zarr_geometry(scales, axes, spatial, input.task.options, source);
+  set_zarr_labels(group, source);
+  const Counts counts = chunk_counts(array, spatial, input.task.limits);
   ScratchFile scratch(input.task.scratch, ".zarr");
   {
     // Mapped, because chunks come in any order.
     CanonicalWriter samples(scratch.path(), {source.dims, carrier_of(array.type), {}});
-    write_chunks(array, path, spatial, std::move(place), input.companions, samples.samples());
+    write_chunks(array, path, spatial, std::move(place), counts, input.companions,
+                 samples.samples(), source.notes);
   }
   const InputFile file(scratch.path());
   source.payload = range_from(file, volume::kHeaderBytes);

@@ -1,17 +1,17 @@
 #include "server/import/formats/zarr_array.h"
 
 #include <algorithm>
+#include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <numeric>
 #include <optional>
 #include <span>
+#include <system_error>
+#include <type_traits>
 #include <utility>
-
-#include <blosc.h>
-#include <zlib.h>
-#include <zstd.h>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -21,12 +21,8 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::uint64_t kMostChunkBytes = std::uint64_t{256} << 20;
 constexpr std::uint64_t kMostAxisSamples = 1'000'000'000;
-constexpr std::uint64_t kSlack = 1U << 16;  // of a stream around another
 constexpr std::size_t kMostCodecs = 8;
-
-using Bytes = std::vector<std::byte>;
 
 [[noreturn]] void throw_damaged(const std::string& what) {
   throw_unusable("The Zarr's metadata is damaged: " + what + " is missing or wrong.");
@@ -38,16 +34,9 @@ using Bytes = std::vector<std::byte>;
                  "filters.");
 }
 
-// Null for a missing member.
-const Json& member(const Json& json, const char* name) {
-  static const Json null;
-  if (!json.is_object()) return null;
-  const auto found = json.find(name);
-  return found == json.end() ? null : *found;
-}
-
-std::string text_of(const Json& json) {
-  return json.is_string() ? json.get<std::string>() : std::string();
+// A name by itself, or with a configuration.
+std::string name_in(const Json& json) {
+  return zarr_text(json.is_string() ? json : zarr_member(json, "name"));
 }
 
 std::vector<std::uint64_t> sizes_of(const Json& json, const std::string& what) {
@@ -86,13 +75,32 @@ void set_type(std::string_view name, ZarrArray& array) {
                  ", which is not supported. Integers and floats are.");
 }
 
+// The bits of a float, such as "0x7fc00000".
+template <class Bits>
+std::optional<Bits> bits_in(std::string_view text) {
+  if (text.size() != 2 + 2 * sizeof(Bits) || !text.starts_with("0x")) return std::nullopt;
+  Bits bits = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, fault] = std::from_chars(text.data() + 2, end, bits, 16);
+  return fault == std::errc() && rest == end ? std::optional(bits) : std::nullopt;
+}
+
+float float_of_half(std::uint16_t half) {
+  float value = 0;
+  floats_of_halves(std::span(&half, 1), std::span(&value, 1));
+  return value;
+}
+
 template <class Sample>
 Sample filled(const Json& value) {
   if constexpr (std::is_floating_point_v<Sample>) {
-    const std::string text = text_of(value);
+    const std::string text = zarr_text(value);
     if (text == "NaN") return std::numeric_limits<Sample>::quiet_NaN();
     if (text == "Infinity") return std::numeric_limits<Sample>::infinity();
     if (text == "-Infinity") return -std::numeric_limits<Sample>::infinity();
+    using Bits = std::conditional_t<sizeof(Sample) == 4, std::uint32_t, std::uint64_t>;
+    if (const auto bits = bits_in<Bits>(text)) return std::bit_cast<Sample>(*bits);
+    if (const auto half = bits_in<std::uint16_t>(text)) return float_of_half(*half);
     if (value.is_number()) return static_cast<Sample>(value.get<double>());
   }
   if (value.is_boolean()) return static_cast<Sample>(value.get<bool>() ? 1 : 0);
@@ -117,7 +125,7 @@ void set_fill(const Json& value, ZarrArray& array) {
 }
 
 void set_separator(const Json& value, ZarrArray& array) {
-  const std::string text = text_of(value);
+  const std::string text = zarr_text(value);
   if (text != "." && text != "/") throw_damaged("the separator of chunk names");
   array.separator = text[0];
 }
@@ -136,22 +144,39 @@ void add_codec(const std::string& name, ZarrArray& array) {
   }
 }
 
+// Codecs rely on it.
+void check_chunks(const ZarrArray& array) {
+  if (array.chunk.size() != array.shape.size()) throw_damaged("the number of axes of chunks");
+  std::uint64_t bytes = bytes_per_sample(array.type);
+  for (const std::uint64_t size : array.chunk) {
+    if (size > ZarrArray::kMostChunkBytes / bytes) {
+      throw_unusable("The Zarr's chunks are larger than 256 MiB, which is not supported.");
+    }
+    bytes *= size;
+  }
+}
+
+void set_plain_order(ZarrArray& array) {
+  array.order.resize(array.shape.size());
+  std::iota(array.order.begin(), array.order.end(), 0);
+}
+
 void read_version_2(const Json& metadata, ZarrArray& array) {
-  array.shape = sizes_of(member(metadata, "shape"), "shape");
-  array.chunk = sizes_of(member(metadata, "chunks"), "chunks");
-  const std::string type = text_of(member(metadata, "dtype"));
+  array.shape = sizes_of(zarr_member(metadata, "shape"), "shape");
+  array.chunk = sizes_of(zarr_member(metadata, "chunks"), "chunks");
+  const std::string type = zarr_text(zarr_member(metadata, "dtype"));
   if (type.size() != 3) throw_unusable("The Zarr's samples are not numbers.");
   array.big_endian = type[0] == '>';
   set_type(std::string_view(type).substr(1), array);
-  array.order.resize(array.shape.size());
-  std::iota(array.order.begin(), array.order.end(), 0);
-  if (text_of(member(metadata, "order")) == "F") std::ranges::reverse(array.order);
-  const Json& separator = member(metadata, "dimension_separator");
+  check_chunks(array);
+  set_plain_order(array);
+  if (zarr_text(zarr_member(metadata, "order")) == "F") std::ranges::reverse(array.order);
+  const Json& separator = zarr_member(metadata, "dimension_separator");
   if (!separator.is_null()) set_separator(separator, array);
-  const Json& filters = member(metadata, "filters");
+  const Json& filters = zarr_member(metadata, "filters");
   if (!filters.is_null() && !filters.empty()) throw_unsupported("filters");
-  const Json& compressor = member(metadata, "compressor");
-  if (!compressor.is_null()) add_codec(text_of(member(compressor, "id")), array);
+  const Json& compressor = zarr_member(metadata, "compressor");
+  if (!compressor.is_null()) add_codec(zarr_text(zarr_member(compressor, "id")), array);
 }
 
 // Axis `order[n]` of the array is axis n of the chunk.
@@ -168,46 +193,47 @@ void transpose(const Json& order, ZarrArray& array) {
   array.order = axes;
 }
 
-void read_codecs(const Json& codecs, ZarrArray& array);
+enum class CodecsOf { kArray, kShard };  // or of a shard's index
 
-constexpr std::uint64_t kMostInnerChunks = 1'000'000;
+void read_codecs(const Json& codecs, CodecsOf owner, ZarrArray& array);
 
 // The chunks in the shards that `array` has as chunks.
 void read_shards(const Json& configuration, ZarrArray& array) {
   ZarrArray inner = array;
   inner.shape = array.chunk;
-  inner.chunk = sizes_of(member(configuration, "chunk_shape"), "chunk_shape of shards");
+  inner.chunk = sizes_of(zarr_member(configuration, "chunk_shape"), "chunk_shape of shards");
   if (inner.chunk.size() != inner.shape.size()) throw_damaged("chunk_shape of shards");
   std::uint64_t count = 1;
   for (std::size_t axis = 0; axis < inner.chunk.size(); ++axis) {
     if (inner.shape[axis] % inner.chunk[axis] != 0) throw_damaged("chunk_shape of shards");
     const std::uint64_t along = inner.shape[axis] / inner.chunk[axis];
-    if (along > kMostInnerChunks / count)
+    if (along > ZarrArray::kMostInnerChunks / count) {
       throw_unsupported("more than a million chunks in a shard");
+    }
     count *= along;
   }
-  read_codecs(member(configuration, "codecs"), inner);
-  if (inner.inner) throw_unsupported("shards in shards");
+  read_codecs(zarr_member(configuration, "codecs"), CodecsOf::kShard, inner);
   ZarrArray index;
-  read_codecs(member(configuration, "index_codecs"), index);
+  read_codecs(zarr_member(configuration, "index_codecs"), CodecsOf::kShard, index);
   array.index_has_sum = index.decoders == std::vector{ZarrCodec::kCrc32c};
   if (index.big_endian || (!index.decoders.empty() && !array.index_has_sum)) {
     throw_unsupported("an unusual index of shards");
   }
-  array.index_is_first = text_of(member(configuration, "index_location")) == "start";
+  array.index_is_first = zarr_text(zarr_member(configuration, "index_location")) == "start";
   array.inner = std::make_shared<ZarrArray>(std::move(inner));
 }
 
-void read_codecs(const Json& codecs, ZarrArray& array) {
+void read_codecs(const Json& codecs, CodecsOf owner, ZarrArray& array) {
   if (!codecs.is_array() || codecs.size() > kMostCodecs) throw_damaged("codecs");
   for (const Json& codec : codecs) {
-    const std::string name = text_of(member(codec, "name"));
-    const Json& configuration = member(codec, "configuration");
+    const std::string name = name_in(codec);
+    const Json& configuration = zarr_member(codec, "configuration");
     if (name == "transpose") {
-      transpose(member(configuration, "order"), array);
+      transpose(zarr_member(configuration, "order"), array);
     } else if (name == "bytes") {
-      array.big_endian = text_of(member(configuration, "endian")) == "big";
+      array.big_endian = zarr_text(zarr_member(configuration, "endian")) == "big";
     } else if (name == "sharding_indexed") {
+      if (owner == CodecsOf::kShard) throw_unsupported("shards in shards");
       if (codecs.size() != 1) throw_unsupported("another codec around shards");
       read_shards(configuration, array);
     } else {
@@ -218,97 +244,38 @@ void read_codecs(const Json& codecs, ZarrArray& array) {
 }
 
 void read_version_3(const Json& metadata, ZarrArray& array) {
-  array.shape = sizes_of(member(metadata, "shape"), "shape");
-  const Json& grid = member(metadata, "chunk_grid");
-  if (text_of(member(grid, "name")) != "regular") throw_unsupported("irregular chunks");
-  array.chunk = sizes_of(member(member(grid, "configuration"), "chunk_shape"), "chunk_shape");
-  set_type(text_of(member(metadata, "data_type")), array);
-  array.order.resize(array.shape.size());
-  std::iota(array.order.begin(), array.order.end(), 0);
-  const Json& encoding = member(metadata, "chunk_key_encoding");
-  const std::string name = text_of(member(encoding, "name"));
+  array.shape = sizes_of(zarr_member(metadata, "shape"), "shape");
+  const Json& grid = zarr_member(metadata, "chunk_grid");
+  if (name_in(grid) != "regular") throw_unsupported("irregular chunks");
+  array.chunk =
+      sizes_of(zarr_member(zarr_member(grid, "configuration"), "chunk_shape"), "chunk_shape");
+  set_type(zarr_text(zarr_member(metadata, "data_type")), array);
+  check_chunks(array);
+  set_plain_order(array);
+  const Json& encoding = zarr_member(metadata, "chunk_key_encoding");
+  const std::string name = name_in(encoding);
   if (name != "default" && name != "v2") throw_damaged("chunk_key_encoding");
   array.prefix = name == "default" ? "c" : "";
   array.separator = name == "default" ? '/' : '.';
-  const Json& separator = member(member(encoding, "configuration"), "separator");
+  const Json& separator = zarr_member(zarr_member(encoding, "configuration"), "separator");
   if (!separator.is_null()) set_separator(separator, array);
-  if (!member(metadata, "storage_transformers").empty()) throw_unsupported("storage transformers");
-  read_codecs(member(metadata, "codecs"), array);
-}
-
-// --- Codecs --------------------------------------------------------------------------------------
-
-Bytes inflated(const Bytes& stored, std::uint64_t most) {
-  constexpr int kZlibOrGzip = 15 + 32;
-  z_stream stream = {};
-  if (inflateInit2(&stream, kZlibOrGzip) != Z_OK) throw std::bad_alloc();
-  Bytes result(most);
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(stored.data()));
-  stream.avail_in = static_cast<uInt>(stored.size());
-  stream.next_out = reinterpret_cast<Bytef*>(result.data());
-  stream.avail_out = static_cast<uInt>(most);
-  const int status = ::inflate(&stream, Z_FINISH);
-  result.resize(most - stream.avail_out);
-  inflateEnd(&stream);
-  return status == Z_STREAM_END ? result : Bytes();
-}
-
-Bytes unzstd(const Bytes& stored, std::uint64_t most) {
-  Bytes result(most);
-  const std::size_t size = ZSTD_decompress(result.data(), most, stored.data(), stored.size());
-  result.resize(ZSTD_isError(size) != 0 ? 0 : size);
-  return result;
-}
-
-Bytes unblosc(const Bytes& stored, std::uint64_t most) {
-  std::size_t size = 0;
-  if (blosc_cbuffer_validate(stored.data(), stored.size(), &size) != 0 || size > most) return {};
-  Bytes result(size);
-  const int found = blosc_decompress_ctx(stored.data(), result.data(), size, 1);
-  result.resize(found < 0 ? 0 : static_cast<std::size_t>(found));
-  return result;
-}
-
-// The checksum of Castagnoli behind the bytes.
-Bytes checked(Bytes stored) {
-  constexpr std::uint32_t kPolynomial = 0x82f63b78;
-  std::uint32_t expected = 0;
-  if (stored.size() < sizeof(expected)) return {};
-  const std::size_t size = stored.size() - sizeof(expected);
-  std::memcpy(&expected, stored.data() + size, sizeof(expected));
-  stored.resize(size);
-  std::uint32_t sum = ~0U;
-  for (const std::byte byte : stored) {
-    sum ^= std::to_integer<std::uint32_t>(byte);
-    for (int bit = 0; bit < 8; ++bit) sum = sum >> 1 ^ ((sum & 1) != 0 ? kPolynomial : 0);
-  }
-  return ~sum == expected ? stored : Bytes();
-}
-
-Bytes decoded(ZarrCodec codec, Bytes stored, std::uint64_t most) {
-  switch (codec) {
-    case ZarrCodec::kDeflate:
-      return inflated(stored, most);
-    case ZarrCodec::kZstd:
-      return unzstd(stored, most);
-    case ZarrCodec::kBlosc:
-      return unblosc(stored, most);
-    case ZarrCodec::kCrc32c:
-      return checked(std::move(stored));
-  }
-  return {};
-}
-
-Bytes widened(const Bytes& samples) {
-  std::vector<std::uint16_t> halves(samples.size() / sizeof(std::uint16_t));
-  std::memcpy(halves.data(), samples.data(), samples.size());
-  std::vector<float> floats(halves.size());
-  floats_of_halves(halves, floats);
-  const auto bytes = std::as_bytes(std::span(floats));
-  return {bytes.begin(), bytes.end()};
+  if (!zarr_member(metadata, "storage_transformers").empty())
+    throw_unsupported("storage transformers");
+  read_codecs(zarr_member(metadata, "codecs"), CodecsOf::kArray, array);
 }
 
 }  // namespace
+
+const Json& zarr_member(const Json& json, const char* name) {
+  static const Json null;
+  if (!json.is_object()) return null;
+  const auto found = json.find(name);
+  return found == json.end() ? null : *found;
+}
+
+std::string zarr_text(const Json& json) {
+  return json.is_string() ? json.get<std::string>() : std::string();
+}
 
 Json zarr_json(const std::filesystem::path& path) {
   const InputFile file(path);
@@ -318,6 +285,16 @@ Json zarr_json(const std::filesystem::path& path) {
     throw_unusable("The Zarr's metadata is damaged: it is not a JSON object.");
   }
   return json;
+}
+
+std::vector<std::uint64_t> ZarrArray::strides() const {
+  std::vector<std::uint64_t> strides(chunk.size());
+  std::uint64_t stride = 1;
+  for (std::size_t each = order.size(); each-- > 0;) {
+    strides[order[each]] = stride;
+    stride *= chunk[order[each]];
+  }
+  return strides;
 }
 
 std::uint64_t ZarrArray::chunk_samples() const {
@@ -335,7 +312,7 @@ std::string ZarrArray::name_of(const std::vector<std::uint64_t>& place) const {
 
 ZarrArray zarr_array(const Json& metadata) {
   ZarrArray array;
-  const Json& version = member(metadata, "zarr_format");
+  const Json& version = zarr_member(metadata, "zarr_format");
   if (version == 2) {
     read_version_2(metadata, array);
   } else if (version == 3) {
@@ -343,121 +320,8 @@ ZarrArray zarr_array(const Json& metadata) {
   } else {
     throw_damaged("zarr_format");
   }
-  if (array.chunk.size() != array.shape.size()) throw_damaged("the number of axes of chunks");
-  std::uint64_t bytes = bytes_per_sample(array.type);
-  for (const std::uint64_t size : array.chunk) {
-    if (size > kMostChunkBytes / bytes) {
-      throw_unusable("The Zarr's chunks are larger than 256 MiB, which is not supported.");
-    }
-    bytes *= size;
-  }
-  set_fill(member(metadata, "fill_value"), array);
+  set_fill(zarr_member(metadata, "fill_value"), array);
   return array;
-}
-
-namespace {
-
-Bytes decode_bytes(const ZarrArray& array, Bytes bytes) {
-  const std::size_t sample_bytes = array.is_half ? 2 : bytes_per_sample(array.type);
-  const std::uint64_t expected = array.chunk_samples() * sample_bytes;
-  for (const ZarrCodec codec : array.decoders) {
-    bytes = decoded(codec, std::move(bytes), expected + kSlack);
-  }
-  if (bytes.size() != expected) throw_unusable("A chunk of the Zarr is damaged or truncated.");
-  if (array.big_endian && sample_bytes > 1) swap_bytes(bytes, sample_bytes);
-  return array.is_half ? widened(bytes) : bytes;
-}
-
-std::vector<std::uint64_t> strides_of(const std::vector<std::uint64_t>& sizes,
-                                      const std::vector<std::size_t>& order) {
-  std::vector<std::uint64_t> strides(sizes.size());
-  std::uint64_t stride = 1;
-  for (std::size_t each = order.size(); each-- > 0;) {
-    strides[order[each]] = stride;
-    stride *= sizes[order[each]];
-  }
-  return strides;
-}
-
-// Calls `use` with each place in a box of these sizes, the last axis fastest.
-template <class Use>
-void for_each_place(const std::vector<std::uint64_t>& sizes, Use use) {
-  std::vector<std::uint64_t> place(sizes.size());
-  for (;;) {
-    use(place);
-    std::size_t axis = sizes.size();
-    while (axis > 0 && ++place[axis - 1] == sizes[axis - 1]) place[--axis] = 0;
-    if (axis == 0) return;
-  }
-}
-
-std::uint64_t dot(const std::vector<std::uint64_t>& one, const std::vector<std::uint64_t>& other) {
-  return std::inner_product(one.begin(), one.end(), other.begin(), std::uint64_t{0});
-}
-
-Bytes decode_shard(const ZarrArray& array, const Bytes& bytes) {
-  constexpr std::uint64_t kMissing = ~std::uint64_t{0};
-  const ZarrArray& inner = *array.inner;
-  std::vector<std::uint64_t> counts;
-  for (std::size_t axis = 0; axis < inner.chunk.size(); ++axis) {
-    counts.push_back(inner.shape[axis] / inner.chunk[axis]);
-  }
-  const std::uint64_t count = array.chunk_samples() / inner.chunk_samples();
-  const std::uint64_t index_bytes = count * 16 + (array.index_has_sum ? 4 : 0);
-  if (bytes.size() < index_bytes) throw_unusable("A shard of the Zarr is damaged or truncated.");
-  const auto first =
-      array.index_is_first ? bytes.begin() : bytes.end() - static_cast<std::ptrdiff_t>(index_bytes);
-  Bytes index(first, first + static_cast<std::ptrdiff_t>(index_bytes));
-  if (array.index_has_sum) index = checked(std::move(index));
-  if (index.size() != count * 16) throw_unusable("A shard of the Zarr is damaged or truncated.");
-
-  std::vector<std::size_t> plain(inner.shape.size());
-  std::iota(plain.begin(), plain.end(), 0);
-  const std::vector<std::uint64_t> to = strides_of(inner.shape, plain);
-  const std::vector<std::uint64_t> from = strides_of(inner.chunk, inner.order);
-  const std::size_t size = array.fill.size();
-  Bytes result(array.chunk_samples() * size);
-  for (std::size_t at = 0; at < result.size(); at += size) {
-    std::memcpy(result.data() + at, array.fill.data(), size);
-  }
-  const std::byte* entry = index.data();
-  for_each_place(counts, [&](const std::vector<std::uint64_t>& chunk) {
-    std::uint64_t range[2] = {};
-    std::memcpy(range, entry, sizeof(range));
-    entry += sizeof(range);
-    if (range[0] == kMissing && range[1] == kMissing) return;
-    if (range[0] > bytes.size() || range[1] > bytes.size() - range[0]) {
-      throw_unusable("A shard of the Zarr is damaged or truncated.");
-    }
-    const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(range[0]);
-    const Bytes samples =
-        decode_bytes(inner, {begin, begin + static_cast<std::ptrdiff_t>(range[1])});
-    std::uint64_t corner = 0;
-    for (std::size_t axis = 0; axis < chunk.size(); ++axis) {
-      corner += chunk[axis] * inner.chunk[axis] * to[axis];
-    }
-    for_each_place(inner.chunk, [&](const std::vector<std::uint64_t>& place) {
-      std::memcpy(result.data() + (corner + dot(place, to)) * size,
-                  samples.data() + dot(place, from) * size, size);
-    });
-  });
-  return result;
-}
-
-}  // namespace
-
-std::vector<std::byte> decode_chunk(const ZarrArray& array, const std::filesystem::path& path) {
-  const std::size_t sample_bytes = array.is_half ? 2 : bytes_per_sample(array.type);
-  const std::uint64_t expected = array.chunk_samples() * sample_bytes;
-  constexpr std::uint64_t kIndexBytes = kMostInnerChunks * 16;
-  const InputFile file(path);
-  // Compression never adds as much.
-  if (file.size() > expected + expected / 8 + kSlack + (array.inner ? kIndexBytes : 0)) {
-    throw_unusable("A chunk of the Zarr is longer than its samples.");
-  }
-  Bytes bytes(file.size());
-  file.read_exactly(0, bytes);
-  return array.inner ? decode_shard(array, bytes) : decode_bytes(array, std::move(bytes));
 }
 
 }  // namespace isomesh::import

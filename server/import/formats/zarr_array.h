@@ -20,12 +20,18 @@ using Json = nlohmann::json;
 // The JSON of a file. Throws Error kUnusableVolume if it is damaged or longer than 16 MiB.
 inline constexpr std::uint64_t kMostZarrHeaderBytes = std::uint64_t{16} << 20;
 Json zarr_json(const std::filesystem::path& path);
+// Null for a missing member.
+const Json& zarr_member(const Json& json, const char* name);
+// Empty if it is none.
+std::string zarr_text(const Json& json);
 
 enum class ZarrCodec { kDeflate, kZstd, kBlosc, kCrc32c };
 
 struct ZarrArray {
   // The sizes along all axes, the slowest first; at most kMostAxes.
   static constexpr std::size_t kMostAxes = 16;
+  static constexpr std::uint64_t kMostChunkBytes = std::uint64_t{256} << 20;
+  static constexpr std::uint64_t kMostInnerChunks = 1'000'000;  // of a shard
   std::vector<std::uint64_t> shape;
   std::vector<std::uint64_t> chunk;
   StoredType type = StoredType::kUint8;
@@ -42,6 +48,8 @@ struct ZarrArray {
   bool index_has_sum = false;
 
   std::uint64_t chunk_samples() const;
+  // From a sample of a chunk to the next along each axis, in samples.
+  std::vector<std::uint64_t> strides() const;
   // The name of a chunk below the array.
   std::string name_of(const std::vector<std::uint64_t>& place) const;
 };

@@ -133,6 +133,21 @@ ArchiveFiles Companions::all() const {
   return companions;
 }
 
+std::set<std::string> Companions::below(const std::string& folder) const {
+  std::set<std::string> names;
+  const std::string path = (std::filesystem::path(folder) / "").lexically_normal().generic_string();
+  if (archive_ == nullptr || path.size() < 2 || path.starts_with('/') || path.starts_with('.')) {
+    return names;
+  }
+  const std::string above = folder_.empty() ? "" : folder_.generic_string() + '/';
+  const std::string whole = above + path;
+  for (auto at = archive_->lower_bound(whole);
+       at != archive_->end() && at->first.starts_with(whole); ++at) {
+    names.insert(at->first.substr(above.size()));
+  }
+  return names;
+}
+
 const std::filesystem::path& companion(const std::string& name, const Companions& companions) {
   const std::string reason = "The header names the data file " + in_quotes(name);
   const std::string path = std::filesystem::path(name).lexically_normal().generic_string();

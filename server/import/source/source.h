@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -77,6 +78,10 @@ class Companions {
 
   // All companions, by their relative paths.
   ArchiveFiles all() const;
+
+  // The relative paths of those below a folder, as `find` takes them; none for a path that leaves
+  // the folder of the header.
+  std::set<std::string> below(const std::string& folder) const;
 
  private:
   const ArchiveFiles* archive_ = nullptr;
