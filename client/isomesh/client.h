@@ -130,8 +130,9 @@ class Client {
   Client& operator=(Client&&) noexcept;
 
   // Uploads a file from disk in pieces. A folder, or a header (.mhd, .nhdr) with its data files, is
-  // sent as a TAR generated on the fly. The same upload gives the same volume. Throws kUnusableVolume
-  // with the choices if the upload has several volumes, which are stored nevertheless.
+  // sent as a TAR generated on the fly. The same upload gives the same volume. Throws
+  // kUnusableVolume with the choices if the upload has several volumes, which are stored
+  // nevertheless.
   Volume upload(const std::filesystem::path& path, const UploadOptions& options = {});
   // The same for an upload that may have several volumes: returns a result for each. A single one
   // has an empty member, and its error is thrown. Several paths are sent together, such as the .hdr
