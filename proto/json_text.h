@@ -21,4 +21,10 @@ Value parse_json(std::string_view text, const Options&... options) {
   return Value::parse(marked, options...);
 }
 
+// Tells a text's parts to nlohmann's interface for events, until the text ends or is malformed.
+template <class Value, class Events>
+void read_json_events(std::string_view text, Events& events) {
+  Value::sax_parse(text, &events, Value::input_format_t::json, false);
+}
+
 }  // namespace isomesh

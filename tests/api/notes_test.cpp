@@ -160,6 +160,7 @@ struct Shown {
 std::string nearly_whole() {
   std::vector<float> labels(24, 0);
   for (std::size_t at = 8; at < 16; ++at) labels[at] = 0.9999F;
+  for (std::size_t at = 16; at < 24; ++at) labels[at] = 2;
   return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(labels));
 }
 

@@ -72,7 +72,8 @@ RawUpload many_labels() {
 // Whichever of its files is damaged, and whatever is asked for first.
 TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
   start();
-  const std::string volume = upload(daemon(), many_labels()).id;
+  const Volume uploaded = upload(daemon(), many_labels());
+  const std::string& volume = uploaded.id;
   const Answer accepted =
       daemon().send("POST", "/v1/jobs",
                     R"({"volume": ")" + volume +
@@ -97,7 +98,7 @@ TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
                                       {glb, "/mesh.glb"}}) {
     const std::string whole = daemon().get(path + request).body;
     spoil(blob);
-    std::filesystem::remove(file_of(volume));
+    std::filesystem::remove(file_of(uploaded.samples));
     const auto becomes = [&, asked = std::string(request)](int expected) {
       return eventually([&] { return status(asked) == expected; });
     };
@@ -112,7 +113,7 @@ TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
 TEST_F(Damage, NothingIsToldOfASpoiltVolume) {
   start();
   const Volume volume = small_volume();
-  spoil(volume.id);
+  spoil(volume.samples);
   const std::string path = "/v1/volumes/" + volume.id;
   for (const std::string& target :
        {path + "/slice.png", path + "/histogram", "/v1/estimate?iso=100&volume=" + volume.id}) {

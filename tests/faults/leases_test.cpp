@@ -69,7 +69,7 @@ TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
 TEST_F(Leases, AVolumeThatIsCutUnderARunningJobEndsThatJobAlone) {
   start({"--workers", "1"});
   const Volume volume = upload(daemon(), long_upload());
-  const std::filesystem::path file = file_of(volume.id);
+  const std::filesystem::path file = file_of(volume.samples);
   const std::string bytes = read_file(file);
   Job job;
   // One that has been read whole by then is none the worse for it.

@@ -10,7 +10,7 @@
 #include "proto/types.h"
 #include "server/http/requests/request.h"
 #include "server/import/message/import_message.h"
-#include "server/jobs/library/upload_name.h"
+#include "server/import/message/upload_name.h"
 
 namespace isomesh::http {
 
@@ -29,7 +29,7 @@ const std::set<std::string>& import_parameters();
 // The name in a Content-Disposition header (RFC 6266), in UTF-8, without control characters,
 // truncated to the limit; empty if missing. The parameter `name` is a chosen one, `filename` the
 // file's, whose folders are removed.
-jobs::UploadName upload_name_of(std::string_view content_disposition);
+import::UploadName upload_name_of(std::string_view content_disposition);
 
 // The same for a plain name.
 std::string plain_file_name(std::string_view name);

@@ -23,7 +23,7 @@ namespace isomesh::http {
 struct PartialNote {
   std::string owner;
   Parameters query;  // of its first request
-  jobs::UploadName upload_name;
+  import::UploadName upload_name;
   std::string sha256;  // expected hash of all bytes, in hex; empty if unknown
   std::optional<std::uint64_t> length = {};
   bool is_complete = false;

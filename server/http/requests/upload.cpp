@@ -201,7 +201,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   for (const auto& [header, sha256] : expected) {
     if (digest != sha256) throw other_digest(header);
   }
-  body_ = {file_.path(), is_form ? jobs::UploadName{receiver.file_name()}
+  body_ = {file_.path(), is_form ? import::UploadName{receiver.file_name()}
                                  : upload_name_of(request.header("Content-Disposition"))};
 }
 

@@ -9,7 +9,7 @@
 
 #include "base/files.h"
 #include "server/http/requests/request.h"
-#include "server/jobs/library/upload_name.h"
+#include "server/import/message/upload_name.h"
 #include "server/store/files/data_folder.h"
 
 namespace isomesh::http {
@@ -22,7 +22,7 @@ struct UploadLimits {
 struct ReceivedBody {
   std::filesystem::path path;
   // From the form or the header Content-Disposition. May be empty, and may name a patient.
-  jobs::UploadName name;
+  import::UploadName name;
 };
 
 // A request's body in a file: written as it arrives, counted, checked against its Content-Digest.

@@ -71,7 +71,7 @@ class OwnKeys : public nlohmann::json_sax<Json> {
 bool is_zarr(std::string_view head) {
   if (!trimmed(head.substr(0, 64)).starts_with('{')) return false;
   OwnKeys keys;
-  Json::sax_parse(head, &keys, Json::input_format_t::json, false);
+  read_json_events<Json>(head, keys);
   return keys.found();
 }
 

@@ -17,14 +17,15 @@ bool leaves_members_open(const Error& error, const ImportOptions& options) {
   return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
 }
 
-// The id of a volume: the digest of what its upload says. It has a key, because much of that may
-// concern persons: without one, anyone who sees an id, for instance in a log, could test whose it
-// is. The format and the names of files say nothing of the volume.
+// The id of a volume: the digest of what its upload says. It has a key if that concerns a person:
+// without one, anyone who sees an id, for instance in a log, could test whose it is. The format and
+// the names of files say nothing of the volume.
 std::string id_of(Volume volume, const std::string& key) {
   volume.name.reset();
   volume.format.clear();
   volume.ignored.clear();
-  return to_hex(hmac_sha256(key, to_record(volume)));
+  const std::string said = to_record(volume);
+  return volume.dicom ? to_hex(hmac_sha256(key, said)) : sha256_of(said);
 }
 
 // One name for several volumes needs the member's beside it.

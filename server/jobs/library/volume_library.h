@@ -10,15 +10,17 @@
 
 #include "proto/types.h"
 #include "server/import/message/import_message.h"
+#include "server/import/message/upload_name.h"
 #include "server/jobs/library/blob_eraser.h"
 #include "server/jobs/library/import_runner.h"
-#include "server/jobs/library/upload_name.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::jobs {
+
+using import::UploadName;
 
 // Lets another thread cancel imports.
 struct ImportControl {

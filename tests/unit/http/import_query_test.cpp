@@ -136,7 +136,7 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
 
 TEST(UploadNameOf, IsWhatTheHeaderTells) {
   const auto file_name_of = [](std::string_view header) {
-    const jobs::UploadName name = upload_name_of(header);
+    const import::UploadName name = upload_name_of(header);
     EXPECT_FALSE(name.is_chosen) << header;
     return name.text;
   };
@@ -153,7 +153,7 @@ TEST(UploadNameOf, IsWhatTheHeaderTells) {
 }
 
 TEST(UploadNameOf, IsTheOneThatAPersonChose) {
-  const auto chosen = [](const std::string& text) { return jobs::UploadName{text, true}; };
+  const auto chosen = [](const std::string& text) { return import::UploadName{text, true}; };
   EXPECT_EQ(upload_name_of("attachment; filename=a.nii; name=\"left/right\""),
             chosen("left/right"));
   EXPECT_EQ(upload_name_of("attachment; name*=UTF-8''M%C3%BCller%0A"), chosen("M\xC3\xBCller"));

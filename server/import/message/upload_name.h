@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace isomesh::jobs {
+namespace isomesh::import {
 
 // A client's name for an upload.
 struct UploadName {
@@ -14,4 +14,4 @@ struct UploadName {
   bool operator==(const UploadName&) const = default;
 };
 
-}  // namespace isomesh::jobs
+}  // namespace isomesh::import
