@@ -41,6 +41,7 @@ class Life {
   void store(const std::string& volume) {
     Volume stored;
     stored.id = volume;
+    stored.samples = volume;
     stored.created = timestamp();
     volumes_.add("", stored);
   }

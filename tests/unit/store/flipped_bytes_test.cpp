@@ -49,7 +49,7 @@ class FlippedBytes : public testing::Test {
   static Volume volume(std::size_t number) {
     Volume volume;
     volume.id = "volume-" + std::string(40, static_cast<char>('a' + number));
-    volume.samples = volume.id;
+    volume.samples = "samples-" + std::string(40, static_cast<char>('a' + number));
     volume.created = "2024-01-01T00:00:0" + std::to_string(number) + ".000Z";
     return volume;
   }
