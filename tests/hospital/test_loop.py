@@ -68,7 +68,7 @@ class TheWay(Loop):
         daemon = self.daemon()
         one = self.succeeded(daemon, self.order(daemon, mine))
         other = self.succeeded(daemon, self.order(daemon, yours))
-        self.assertEqual(one["volume"], other["volume"])
+        self.assertNotEqual(one["volume"], other["volume"])
         found = self.pacs.objects(yours.study)
         self.assertEqual(len(found), 1)
         self.assertEqual(found[0]["00100020"]["Value"], ["B-2"])
