@@ -48,9 +48,8 @@ class VolumeLibrary {
   // (ImportPlaces). Second: false if the owner already had the volume: the same samples, and
   // everything else that the upload says. Then the record keeps the format, the ignored files and,
   // unless one was chosen now, the name of the first upload, but the returned volume has this one's
-  // format and ignored files. Throws
-  // what ImportRunner::run throws, also while the bytes are stored, and kOutOfSpace. It stores
-  // nothing if it throws kCancelled.
+  // format and ignored files. Throws what ImportRunner::run throws, also while the bytes are
+  // stored, and kOutOfSpace. It stores nothing if it throws kCancelled.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const ImportOptions& options = {}, const UploadName& name = {},
                               const std::string& party = {}, const ImportControl& control = {});

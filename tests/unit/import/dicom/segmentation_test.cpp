@@ -340,7 +340,7 @@ TEST(DicomSegmentation, OfLabelsKeepsThem) {
   EXPECT_EQ(coloured.volume.labels, outcome.volume.labels);
 }
 
-// What a program writes of them differs, and their surfaces do not.
+// Programs write different things of them, and their surfaces do not differ.
 TEST(DicomSegmentation, IsClosedWhereFramesAreLeftOut) {
   const SegmentObject sparse = {
       .frames = {{.z = 2, .segment = 1, .labels = {7}}, {.z = 4, .segment = 1, .labels = {7}}},
