@@ -85,8 +85,8 @@ class Values {
   // Returns false if there are too many.
   bool sort() {
     std::ranges::sort(values_);
-    const auto rest = std::ranges::unique(values_);
-    values_.erase(rest.begin(), rest.end());
+    // Clang 14 cannot compile std::ranges::unique of g++ 12.
+    values_.erase(std::unique(values_.begin(), values_.end()), values_.end());
     return values_.size() <= Volume::kMostLabels;
   }
 
