@@ -43,7 +43,8 @@ bool have_own_places(const DataSet& data) {
     if (all[frame].item(kPlanePositionVolumeSequence) != nullptr) return true;
     for (const auto& [sequence, tag] : {std::pair{kPlanePositionSequence, kImagePosition},
                                         std::pair{kPlaneOrientationSequence, kImageOrientation}}) {
-      const auto place_in = [&](const DataSet& groups) {
+      // Clang 14 does not capture what a structured binding names.
+      const auto place_in = [sequence = sequence, tag = tag](const DataSet& groups) {
         const DataSet* item = groups.item(sequence);
         return item == nullptr ? std::string_view() : item->text(tag);
       };
