@@ -169,7 +169,8 @@ TEST(DicomPadding, MayBeARange) {
     const auto stored = [](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
       return is_padded(i) ? -3024 + static_cast<int>(k) * 300 : image_value(i, j, k);
     };
-    const auto change = [&](DicomObject& object, std::uint32_t slice) {
+    // Clang 14 does not capture what a structured binding names.
+    const auto change = [value = value, limit = limit](DicomObject& object, std::uint32_t slice) {
       with_padding(value)(object, slice);
       object.bytes(kPixelPaddingRangeLimit, "SS", word(limit));
     };
