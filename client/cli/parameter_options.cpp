@@ -3,7 +3,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <numeric>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -255,8 +254,8 @@ class ParameterOptions {
       if (others >= Volume::kMostLabels - labels.size()) {
         refuse(name, "must be at most " + std::to_string(Volume::kMostLabels) + " labels");
       }
-      labels.resize(labels.size() + others + 1);
-      std::iota(labels.end() - static_cast<std::ptrdiff_t>(others + 1), labels.end(), *first);
+      labels.push_back(*first);  // none counts beyond the last, which may be the largest there is
+      for (std::uint64_t n = 0; n < others; ++n) labels.push_back(labels.back() + 1);
     }
     return labels;
   }
