@@ -273,7 +273,9 @@ TEST_F(LabelFilesTest, ObjHasAGroupForEachLabel) {
 
 TEST_F(LabelFilesTest, ThreeMfHasAnObjectWithNameColourAndValueForEachLabel) {
   labels_[2].name = "a < b & \"c\"\x01";
-  const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
+  const std::string bytes = encoded(MeshFormat::k3mf);
+  EXPECT_EQ(test::objects_in(bytes, "3mf").size(), kLabels);
+  const test::Model3mf model = test::read_with_lib3mf(bytes);
   EXPECT_TRUE(model.is_in_millimetres);
   EXPECT_EQ(model.items, 1U);
   EXPECT_EQ(model.together, "5 labels");
