@@ -165,7 +165,6 @@ constexpr std::array kFormats = {
                  constexpr std::uint64_t kLabelPerTriangle = 30;
                  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
                },
-           .shows_topology = [](const MeshParameters&) { return true; },
            .encode = encode_3mf},
     Format{.format = MeshFormat::kUsda,
            .media_type = "model/vnd.usda",
