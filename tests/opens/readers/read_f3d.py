@@ -1,0 +1,16 @@
+"""F3D draws a picture and tells what it loaded; of several objects, the numbers in its scene graph."""
+import re
+
+from report import main, package_version, said
+
+
+def read(path, _):
+    text = said('xvfb-run', '-a', 'f3d', '--verbose', '--output=/tmp/f3d.png', path)
+    numbers = [[int(v) for v in re.findall(f'Number of {what}: (\\d+)', text)] for what in ('points', '(?:polygons|cells)')]
+    if not any(numbers):
+        problem = re.search(r'(is not a file of a supported|No file loaded|ERROR|rror).*', text)
+        raise RuntimeError(problem.group(0) if problem else 'tells no numbers')
+    return [{'triangles': sum(numbers[1]), 'vertices': sum(numbers[0]), 'bounds': None}]
+
+
+main(package_version('f3d'), read)

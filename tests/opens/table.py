@@ -1,0 +1,81 @@
+"""Writes docs/opens-in.md from what the readers answered."""
+import re
+
+import judge
+
+KINDS = ['glb-none', 'glb-quantized', 'glb-meshopt', 'glb-khr-meshopt', 'glb-draco', 'drc', 'stl', 'ply', 'obj', '3mf', 'usda', 'usdz', 'off']
+KINDS += ['vtk', 'vtp', 'gii']
+MAIN = {'drc': 'ball', 'stl': 'ball', 'off': 'ball', 'gii': 'ball'}
+COLUMNS = ['triangles', 'place', 'names', 'colours', 'labels', 'normals', 'distances']
+SPECIAL = {
+    'open': 'A surface that is not closed',
+    'lods': 'Two levels of detail',
+    'distances': 'Distances',
+    'head': 'A surface of several primitives',
+}
+
+
+def title(kind):
+    return f'`glb`, {kind[4:]}' if kind.startswith('glb') else f'`{kind}`'
+
+
+def short(cells):
+    """One cell of the large table."""
+    words, is_right = cells['triangles']
+    if not is_right:
+        return f'**{words}**'
+    lacks = [f'no {column}' for column in ('names', 'colours') if column in cells and not cells[column][1]]
+    lacks += [cells['place'][0].split(', ')[-1]] if not cells['place'][1] else []
+    return f'**{", ".join(lacks)}**' if lacks else 'all'
+
+
+def row(columns):
+    return f'| {" | ".join(columns)} |'
+
+
+def table(head, rows):
+    return ['', row(head), '|' + '---|' * len(head), *map(row, rows)]
+
+
+def overview(readers, judged):
+    rows = []
+    for reader, program in readers:
+        found = [judged.get((reader.key, f'{MAIN.get(kind, "atlas")}-{kind}')) for kind in KINDS]
+        rows.append([program, *('' if cells is None else short(cells) for cells in found)])
+    return table(['program', *map(title, KINDS)], rows)
+
+
+def details(readers, judged, file):
+    """Programs that get the same share a row. Those that open nothing are in the large table."""
+    programs = {}
+    for reader, program in readers:
+        cells = judged.get((reader.key, file))
+        if cells and len(cells) > 1:
+            programs.setdefault(tuple(cells.get(column, ('–', True)) for column in COLUMNS), []).append(program)
+    columns = [column for at, column in enumerate(COLUMNS) if any(cells[at][0] != '–' for cells in programs)]
+    rows = []
+    for cells, named in programs.items():
+        kept = [cell for column, cell in zip(COLUMNS, cells) if column in columns]
+        rows.append([', '.join(named), *(words if is_right else f'**{words}**' for words, is_right in kept)])
+    return table(['programs', *columns], rows) if rows else []
+
+
+def write(path, readers, files, answers):
+    """Replaces what stands between the marks in the page."""
+    by_name = {file.path.stem: file for file in files}
+    judged = {key: judge.cells(by_name[key[1]], answer) for key, answer in answers.items() if key[1] in by_name}
+    versions = {key[0]: answer['version'] for key, answer in answers.items() if 'version' in answer}
+    named = [(reader, f'{reader.program} {versions[reader.key]}') for reader in readers if reader.key in versions]
+    lines = ['## Which format in which program', *overview(named, judged), '', '## What arrives']
+    for kind in KINDS:
+        lines += ['', f'### {title(kind)}', *details(named, judged, f'{MAIN.get(kind, "atlas")}-{kind}')]
+    for shape, words in SPECIAL.items():
+        lines += ['', f'## {words}']
+        for file in files:
+            if file.shape == shape:
+                lines += ['', f'### {words}: {title(file.kind)}', *details(named, judged, file.path.stem)]
+    text = path.read_text()
+    begin, end = '<!-- tests/opens/run writes from here -->\n', '\n<!-- to here -->'
+    made = re.sub(f'{begin}.*?{end}', lambda _: begin + '\n'.join(lines) + end, text, flags=re.DOTALL)
+    path.write_text(made)
+    return judged
