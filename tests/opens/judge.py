@@ -101,7 +101,7 @@ def close(a, b):
 
 
 def colours(file, surfaces):
-    found = [s.get('colour') for s in surfaces]
+    found = [colour for s in surfaces for colour in s.get('colours') or [s.get('colour')]]
     if all(any(close(colour, other) for other in found) for colour, _ in file.labels.values()):
         return 'all', True
     distinct = sorted({colour for colour in found if colour})
@@ -129,7 +129,8 @@ def cells(file, answer):
         result['labels'] = labels(file, surfaces)
     elif file.labels:
         result['names'] = names(file, surfaces) if 'name' in told else ('–', True)
-        result['colours'] = colours(file, surfaces) if 'colour' in told else ('–', True)
+    if file.labels and file.suffix not in ('vtk', 'vtp'):
+        result['colours'] = colours(file, surfaces) if {'colour', 'colours'} & told else ('–', True)
     if file.suffix in ('glb', 'usda', 'usdz'):
         result['normals'] = ('–', True) if 'normals' not in told else ('yes', True) if all(s['normals'] for s in surfaces) else ('no', False)
     if file.shape == 'distances':

@@ -15,9 +15,10 @@ def surfaces_of(node, parent, scene, encode):
         points = [[sum(a * b for a, b in zip(row, (*point, 1))) for row in matrix[:3]] for point in rows]
         properties = {p['key']: p['value'] for p in scene['materials'][mesh['materialindex']]['properties']}
         colour = properties.get('$clr.base', properties.get('$clr.diffuse'))
+        colours = sorted({hex_of(row) for row in zip(*[iter(mesh['colors'][0])] * 4)}) if mesh.get('colors') else []
         # Materials of 3MF keep the name that its nodes lack.
         name = node['name'] if not node['name'].startswith('Object_') else properties.get('?mat.name')
-        yield surface(points, len(mesh['faces']), name=name, colour=colour and encode(colour), normals='normals' in mesh)
+        yield surface(points, len(mesh['faces']), name=name, colour=colour and encode(colour), colours=colours, normals='normals' in mesh)
     for child in node.get('children', []):
         yield from surfaces_of(child, matrix, scene, encode)
 

@@ -3,19 +3,24 @@ import sys
 import bpy
 
 sys.path.insert(0, __file__.rsplit('/', 1)[0])
-from report import hex_of_linear, main, surface  # noqa: E402
+from report import hex_of, hex_of_linear, main, surface  # noqa: E402
 
 
-def importer(suffix):
-    known = {
-        'glb': [lambda path: bpy.ops.import_scene.gltf(filepath=path)],
-        # Axes as in the file; Blender's own choice for OBJ is Y up.
-        'stl': [lambda path: bpy.ops.wm.stl_import(filepath=path), lambda path: bpy.ops.import_mesh.stl(filepath=path)],
-        'ply': [lambda path: bpy.ops.wm.ply_import(filepath=path), lambda path: bpy.ops.import_mesh.ply(filepath=path)],
-        'obj': [lambda path: bpy.ops.wm.obj_import(filepath=path)],
-    }
-    known['usda'] = known['usdz'] = [lambda path: bpy.ops.wm.usd_import(filepath=path)]
-    return known[suffix]
+# Newer names first.
+OPERATORS = {
+    'glb': ['import_scene.gltf'],
+    'stl': ['wm.stl_import', 'import_mesh.stl'],
+    'ply': ['wm.ply_import', 'import_mesh.ply'],
+    'obj': ['wm.obj_import'],
+}
+
+
+def load(path, suffix):
+    for name in OPERATORS[suffix]:
+        module, operator = name.split('.')
+        if operator in dir(getattr(bpy.ops, module)):
+            return getattr(getattr(bpy.ops, module), operator)(filepath=path)
+    raise RuntimeError('no importer')
 
 
 def colour_of(mesh):
@@ -29,14 +34,7 @@ def colour_of(mesh):
 
 def read(path, suffix):
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    calls = importer(suffix)
-    for at, call in enumerate(calls):
-        try:
-            call(path)
-            break
-        except AttributeError:  # an older Blender has another name for it
-            if at + 1 == len(calls):
-                raise
+    load(path, suffix)
     surfaces = []
     for thing in bpy.data.objects:
         if thing.type != 'MESH' or not thing.visible_get():
@@ -49,6 +47,7 @@ def read(path, suffix):
                 len(mesh.loop_triangles),
                 name=thing.name,
                 colour=colour_of(mesh),
+                colours=sorted({hex_of(c.color_srgb) for layer in mesh.color_attributes for c in layer.data}),
                 normals=mesh.has_custom_normals,
                 values=[a.name for a in mesh.attributes if a.domain == 'POINT' and a.name not in ('position', '.select_vert')],
             )

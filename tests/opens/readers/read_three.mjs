@@ -11,7 +11,7 @@ import { USDLoader } from 'three/examples/jsm/loaders/USDLoader.js';
 import { VTKLoader } from 'three/examples/jsm/loaders/VTKLoader.js';
 import { MeshoptDecoder } from 'three/examples/jsm/libs/meshopt_decoder.module.js';
 import { Group, Mesh } from 'three';
-import { bytesOf, main, surface } from './report.mjs';
+import { bytesOf, hexesOf, hexOfLinear, main, surface } from './report.mjs';
 
 const draco = new DRACOLoader();
 
@@ -47,11 +47,12 @@ function surfaceOf(mesh) {
   const points = new Float32Array(3 * position.count);
   for (let at = 0; at < position.count; at += 1) points.set([position.getX(at), position.getY(at), position.getZ(at)], 3 * at);
   const material = Array.isArray(mesh.material) ? mesh.material[0] : mesh.material;
+  const colours = attributes.color && hexesOf(attributes.color.array, attributes.color.itemSize, hexOfLinear);
   const values = Object.keys(attributes).filter((key) => !['position', 'normal', 'color', 'uv'].includes(key));
   return surface(
     points,
     (index?.count ?? position.count) / 3,
-    { name: nameOf(mesh), colour: `#${material.color.getHexString()}`, normals: 'normal' in attributes, values },
+    { name: nameOf(mesh), colour: `#${material.color.getHexString()}`, colours, normals: 'normal' in attributes, values },
     mesh.matrixWorld.elements,
   );
 }

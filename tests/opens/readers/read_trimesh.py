@@ -8,6 +8,9 @@ def surface_of(name, mesh, matrix):
     colour = getattr(material, 'main_color', None)
     if colour is None and mesh.visual.kind == 'face':
         colour = mesh.visual.face_colors[0]
+    colours = []
+    if mesh.visual.kind == 'vertex':
+        colours = sorted({hex_of(row / 255) for row in mesh.visual.vertex_colors})
     points = transform_points(mesh.vertices, matrix)
     if not points.any():
         raise RuntimeError('all coordinates are 0, without a warning')
@@ -16,9 +19,10 @@ def surface_of(name, mesh, matrix):
         len(mesh.faces),
         name=name,
         colour=colour is not None and hex_of(colour / 255),
+        colours=colours,
         normals='vertex_normals' in mesh._cache.cache,
         values=list(mesh.vertex_attributes),
-        labels=sorted({int(v) for v in mesh.face_attributes.get('label', [])}),
+        labels=sorted({int(v) for v in mesh.vertex_attributes.get('label', [])}),
     )
 
 

@@ -1,6 +1,6 @@
 import vtk
-from report import hex_of_linear, main, surface
-from vtk.util.numpy_support import vtk_to_numpy
+from polydata import surface_of
+from report import hex_of_linear, main
 
 READERS = {
     'stl': vtk.vtkSTLReader,
@@ -9,16 +9,6 @@ READERS = {
     'vtk': vtk.vtkPolyDataReader,
     'vtp': vtk.vtkXMLPolyDataReader,
 }
-
-
-def surface_of(poly, **more):
-    points = vtk_to_numpy(poly.GetPoints().GetData()) if poly.GetNumberOfPoints() else []
-    labels = poly.GetCellData().GetArray('label')
-    if labels:
-        more['labels'] = sorted({int(v) for v in vtk_to_numpy(labels)})
-    arrays = poly.GetPointData()
-    more['values'] = [arrays.GetArrayName(at) for at in range(arrays.GetNumberOfArrays())]
-    return surface(points, poly.GetNumberOfPolys(), normals=arrays.GetNormals() is not None, **more)
 
 
 def scene(importer, path):

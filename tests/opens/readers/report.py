@@ -16,7 +16,7 @@ def surface(points, triangles, **more):
 
 
 def hex_of(values):
-    return '#' + ''.join(f'{round(255 * float(v)):02x}' for v in values[:3])
+    return '#' + ''.join(f'{max(0, round(255 * float(v))):02x}' for v in values[:3])
 
 
 def hex_of_linear(values):
