@@ -11,7 +11,7 @@ import { USDLoader } from 'three/examples/jsm/loaders/USDLoader.js';
 import { VTKLoader } from 'three/examples/jsm/loaders/VTKLoader.js';
 import { MeshoptDecoder } from 'three/examples/jsm/libs/meshopt_decoder.module.js';
 import { Group, Mesh } from 'three';
-import { bytesOf, hexesOf, hexOfLinear, main, surface } from './report.mjs';
+import { bytesOf, hexOfLinear, main, surface } from './report.mjs';
 
 const draco = new DRACOLoader();
 
@@ -41,13 +41,18 @@ function nameOf(object) {
   return object.parent?.userData.name && (own === '' || /_\d+$/.test(own)) ? object.parent.userData.name : own || object.parent?.name;
 }
 
+function hexesOf(color) {
+  const all = Array.from({ length: color.count }, (_, at) => hexOfLinear([color.getX(at), color.getY(at), color.getZ(at)]));
+  return [...new Set(all)];
+}
+
 function surfaceOf(mesh) {
   const { index, attributes } = mesh.geometry;
   const position = attributes.position;
   const points = new Float32Array(3 * position.count);
   for (let at = 0; at < position.count; at += 1) points.set([position.getX(at), position.getY(at), position.getZ(at)], 3 * at);
   const material = Array.isArray(mesh.material) ? mesh.material[0] : mesh.material;
-  const colours = attributes.color && hexesOf(attributes.color.array, attributes.color.itemSize, hexOfLinear);
+  const colours = attributes.color && hexesOf(attributes.color);
   const values = Object.keys(attributes).filter((key) => !['position', 'normal', 'color', 'uv'].includes(key));
   return surface(
     points,

@@ -49,13 +49,6 @@ export function hex(values) {
   return `#${values.map((v) => Math.round(255 * v).toString(16).padStart(2, '0')).join('')}`;
 }
 
-// The different colours of vertices, from 0 to 1, `step` numbers each.
-export function hexesOf(values, step, encode = hex) {
-  const found = new Set();
-  for (let at = 0; at < values.length; at += step) found.add(encode([...values.slice(at, at + 3)]));
-  return [...found];
-}
-
 // `read` takes the path and its suffix, and returns surfaces.
 export async function main(name, read) {
   const path = process.argv[2];
