@@ -17,6 +17,8 @@ OPTIONS = {
     + [f'--label-name={label}={name}' for label, (name, _) in volumes.LABELS.items()]
     + [f'--label-color={label}={colour}' for label, (_, colour) in volumes.LABELS.items()],
 }
+# Connectome Workbench goes by this name.
+SUFFIXES = {'gii': 'surf.gii'}
 VOLUMES = {'ball': volumes.ball, 'open': volumes.open_surface, 'lods': volumes.ball, 'distances': volumes.ball}
 VOLUMES |= {'head': volumes.head, 'atlas': volumes.atlas}
 
@@ -32,6 +34,10 @@ class File:
     vertices: int = 0
     bounds: list = None
     labels: dict = field(default_factory=dict)  # name: (colour, triangles)
+
+    @property
+    def name(self):
+        return f'{self.shape}-{self.kind}'
 
     @property
     def suffix(self):
@@ -57,7 +63,7 @@ def make(isomesh, folder):
         volume = folder / f'{shape}.nii'
         VOLUMES[shape](volume)
         for codec in [None, *CODECS]:
-            files = [File(shape, kind, folder / f'{shape}-{kind}.{kind.split("-")[0]}') for kind in kinds]
+            files = [File(shape, kind, folder / f'{shape}-{kind}.{SUFFIXES.get(kind, kind.split("-")[0])}') for kind in kinds]
             files = [file for file in files if (codec and file.kind == f'glb-{codec}') or (not codec and '-' not in file.kind)]
             if not files:
                 continue

@@ -67,13 +67,15 @@ def place(file, surfaces):
 
 
 def triangles(file, surfaces):
-    count = sum(s['triangles'] for s in surfaces)
+    count = sum(s['triangles'] or 0 for s in surfaces)
+    if surfaces[0]['triangles'] is None:
+        return 'opens', True
     vertices = sum(s['vertices'] for s in surfaces)
     if count != file.triangles:
         return f'{count} of {file.triangles}', False
     if vertices and vertices == 3 * count and file.suffix != 'stl':
         return 'all, three vertices each', True
-    return 'all', True
+    return 'all' + (f', {surfaces[0]["note"]}' if surfaces[0].get('note') else ''), True
 
 
 def plain(name):
@@ -121,7 +123,7 @@ def cells(file, answer):
     """{column: (words, whether that is right)}."""
     if 'ends' in answer:
         return {'triangles': ('ends', False)}
-    surfaces = [s for s in answer.get('surfaces', []) if s['triangles']]
+    surfaces = [s for s in answer.get('surfaces', []) if s['triangles'] != 0]
     if not surfaces:
         return {'triangles': ('does not open' if 'error' in answer else '0 triangles', False)}
     result = {'triangles': triangles(file, surfaces), 'place': place(file, surfaces)}

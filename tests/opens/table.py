@@ -24,9 +24,15 @@ def short(cells):
     words, is_right = cells['triangles']
     if not is_right:
         return f'**{words}**'
-    lacks = [f'no {column}' for column in ('names', 'colours') if column in cells and not cells[column][1]]
+    lacks = [
+        f'{"other" if cells[column][0].startswith("other") else "no"} {column}'
+        for column in ('names', 'colours')
+        if column in cells and not cells[column][1]
+    ]
     lacks += [cells['place'][0].split(', ')[-1]] if not cells['place'][1] else []
-    return f'**{", ".join(lacks)}**' if lacks else 'all'
+    if lacks:
+        return f'**{", ".join(lacks)}**'
+    return words.replace(', three vertices each', '')
 
 
 def row(columns):
@@ -62,8 +68,9 @@ def details(readers, judged, file):
 
 def write(path, readers, files, answers):
     """Replaces what stands between the marks in the page."""
-    by_name = {file.path.stem: file for file in files}
-    judged = {key: judge.cells(by_name[key[1]], answer) for key, answer in answers.items() if key[1] in by_name}
+    by_name = {file.name: file for file in files}
+    wanted = {(reader.key, file.name) for reader in readers for file in files if file.kind in reader.kinds}
+    judged = {key: judge.cells(by_name[key[1]], answer) for key, answer in answers.items() if key in wanted}
     versions = {key[0]: answer['version'] for key, answer in answers.items() if 'version' in answer}
     named = [(reader, f'{reader.program} {versions[reader.key]}') for reader in readers if reader.key in versions]
     lines = ['## Which format in which program', *overview(named, judged), '', '## What arrives']
@@ -73,7 +80,7 @@ def write(path, readers, files, answers):
         lines += ['', f'## {words}']
         for file in files:
             if file.shape == shape:
-                lines += ['', f'### {words}: {title(file.kind)}', *details(named, judged, file.path.stem)]
+                lines += ['', f'### {words}: {title(file.kind)}', *details(named, judged, file.name)]
     text = path.read_text()
     begin, end = '<!-- tests/opens/run writes from here -->\n', '\n<!-- to here -->'
     made = re.sub(f'{begin}.*?{end}', lambda _: begin + '\n'.join(lines) + end, text, flags=re.DOTALL)

@@ -3,7 +3,7 @@ import { resolveObjectURL } from 'node:buffer';
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import vm from 'node:vm';
-import { DOMParser, parseHTML } from 'linkedom';
+import { DOMParser as Parser, parseHTML } from 'linkedom';
 
 class InlineWorker {
   constructor(url) {
@@ -50,6 +50,13 @@ class FileRequest extends EventTarget {
   setRequestHeader() {}
   getResponseHeader() {}
   abort() {}
+}
+
+// A browser's selectors match XML elements by their names without prefixes; linkedom's do not.
+class DOMParser extends Parser {
+  parseFromString(text, type) {
+    return super.parseFromString(text.replace(/<(\/?)\w+:/g, '<$1'), type);
+  }
 }
 
 const { window, document, Node } = parseHTML('<html><head></head><body></body></html>');

@@ -19,7 +19,16 @@ def load(path, suffix):
     for name in OPERATORS[suffix]:
         module, operator = name.split('.')
         if operator in dir(getattr(bpy.ops, module)):
-            return getattr(getattr(bpy.ops, module), operator)(filepath=path)
+            load_it = getattr(getattr(bpy.ops, module), operator)
+            try:
+                load_it(filepath=path)
+                return None
+            except RuntimeError:
+                if suffix != 'glb':
+                    raise
+            # Blender 3.4 of Debian 12 has a numpy that its importer does not know, and needs it for the normals of a file.
+            load_it(filepath=path, import_shading='SMOOTH')
+            return 'with Shading: Smooth'
     raise RuntimeError('no importer')
 
 
@@ -34,7 +43,7 @@ def colour_of(mesh):
 
 def read(path, suffix):
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    load(path, suffix)
+    note = load(path, suffix)
     surfaces = []
     for thing in bpy.data.objects:
         if thing.type != 'MESH' or not thing.visible_get():
@@ -46,6 +55,7 @@ def read(path, suffix):
                 [thing.matrix_world @ vertex.co for vertex in mesh.vertices],
                 len(mesh.loop_triangles),
                 name=thing.name,
+                note=note,
                 colour=colour_of(mesh),
                 colours=sorted({hex_of(c.color_srgb) for layer in mesh.color_attributes for c in layer.data}),
                 normals=mesh.has_custom_normals,

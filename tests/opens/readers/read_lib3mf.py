@@ -35,16 +35,11 @@ def items(iterator, move, current):
         yield handle_of(current, iterator)
 
 
-def main_color(model, thing):
+def main_color(thing):
     handler = handle_of('object_createdefaultpropertyhandler', thing)
-    group, index = ctypes.c_uint(), ctypes.c_uint()
-    call('defaultpropertyhandler_getbasematerial', handler, ctypes.byref(group), ctypes.byref(index))
-    if group.value == 0:
-        return None
-    material = handle_of('model_getresourcebyid', model, group)
-    parts = [ctypes.c_ubyte() for _ in range(4)]
-    call('basematerial_getdisplaycolor', material, index, *map(ctypes.byref, parts))
-    return '#' + ''.join(f'{part.value:02x}' for part in parts[:3])
+    color = (ctypes.c_ubyte * 4)()
+    call('defaultpropertyhandler_getcolor', handler, 0, color)
+    return '#' + bytes(color[:3]).hex()
 
 
 def read(path, _):
@@ -59,7 +54,7 @@ def read(path, _):
             call('meshobject_getvertex', thing, at, point)
             points.append(list(point))
         triangles = number_of('meshobject_gettrianglecount', thing)
-        surfaces.append(surface(points, triangles, name=text_of('object_getnameutf8', thing), colour=main_color(model, thing)))
+        surfaces.append(surface(points, triangles, name=text_of('object_getnameutf8', thing), colour=main_color(thing)))
     return surfaces
 
 

@@ -25,8 +25,11 @@ await main('online-3d-viewer', async (path) => {
   const surfaces = [];
   model.EnumerateTransformedMeshInstances((mesh) => {
     const points = Array.from({ length: mesh.VertexCount() }, (_, at) => mesh.GetVertex(at)).flatMap(({ x, y, z }) => [x, y, z]);
-    const { r, g, b } = model.GetMaterial(mesh.GetTriangle(0).mat).color;
-    surfaces.push(surface(points, mesh.TriangleCount(), { name: mesh.GetName(), colour: hex([r / 255, g / 255, b / 255]), normals: mesh.NormalCount() > 0 }));
+    const hexOf = ({ r, g, b }) => hex([r / 255, g / 255, b / 255]);
+    const colours = Array.from({ length: mesh.VertexColorCount() }, (_, at) => hexOf(mesh.GetVertexColor(at)));
+    const colour = hexOf(model.GetMaterial(mesh.GetTriangle(0).mat).color);
+    const more = { name: mesh.GetName(), colour, colours: [...new Set(colours)], normals: mesh.NormalCount() > 0 };
+    surfaces.push(surface(points, mesh.TriangleCount(), more));
   });
   return surfaces;
 });

@@ -1,4 +1,7 @@
-"""--info tells each object's triangles; where they lie is seen in the STL that it exports."""
+"""--info tells each object's triangles; where they lie is seen in the STL that it exports.
+
+It puts each object of a file on its bed unless --no-ensure-on-bed is given; its window asks about that.
+"""
 import os
 import re
 import tempfile
@@ -13,9 +16,9 @@ def read(path, _):
         raise RuntimeError(text.strip().splitlines()[-1])
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, 'out.stl')
-        said('prusa-slicer', '--export-stl', '--dont-arrange', '--output', out, path)
+        said('prusa-slicer', '--export-stl', '--dont-arrange', '--no-ensure-on-bed', '--output', out, path)
         found = surface_of_stl(out)
-    return [{**found, 'triangles': sum(counts), 'objects': len(counts)}]
+    return [{**found, 'triangles': sum(counts), 'vertices': 0}]
 
 
 main(package_version('prusa-slicer'), read)

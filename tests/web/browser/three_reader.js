@@ -1,5 +1,5 @@
 // What three.js makes of a file, for readers.test.ts, in Chromium.
-import { Group, Mesh, Vector3, Box3 } from 'three';
+import { Box3, Color, Group, Mesh } from 'three';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { ThreeMFLoader } from 'three/addons/loaders/3MFLoader.js';
 import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
@@ -20,13 +20,14 @@ globalThis.read = async (url) => {
   root.traverse((object) => {
     if (!object.isMesh) return;
     const { index, attributes } = object.geometry;
+    const color = attributes.color ? new Color().fromBufferAttribute(attributes.color, 0) : object.material.color;
     const { name } = object.userData.name || object.name ? object : object.parent;
     meshes.push({
       name: object.userData.name ?? name,
-      colour: object.material.color.getHexString(),
+      colour: color.getHexString(),
       triangles: (index ?? attributes.position).count / 3,
     });
   });
   const { min, max } = new Box3().setFromObject(root, true);
-  return { meshes, bounds: [min, max].map((point) => new Vector3().copy(point).toArray()) };
+  return { meshes, bounds: [min.toArray(), max.toArray()] };
 };
