@@ -38,7 +38,8 @@ enum class Space { kLps, kRas };  // directions of a file's x, y and z
 struct FormatRow {
   MeshFormat format;
   std::string_view name;
-  std::string_view title;  // for people
+  std::string_view title;             // for people
+  std::string_view file_suffix = {};  // of offered names; empty: the format's name
   // A job by labels writes one file of all labels, a file of each label in a ZIP, or both.
   bool holds_all_labels = false;
   bool is_zipped = true;
@@ -76,8 +77,11 @@ inline constexpr std::array kFormatRows = {
     FormatRow{.format = MeshFormat::kOff, .name = "off", .title = "OFF"},
     FormatRow{.format = MeshFormat::kVtk, .name = "vtk", .title = "VTK", .holds_all_labels = true},
     FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .title = "VTP", .holds_all_labels = true},
-    FormatRow{
-        .format = MeshFormat::kGii, .name = "gii", .title = "GIFTI", .own_space = Space::kRas},
+    FormatRow{.format = MeshFormat::kGii,
+              .name = "gii",
+              .title = "GIFTI",
+              .file_suffix = "surf.gii",  // Connectome Workbench tells GIFTI's kinds by their names
+              .own_space = Space::kRas},
     FormatRow{
         .format = MeshFormat::kZip, .name = "zip", .title = "ZIP of labels", .is_zipped = false}};
 
@@ -89,6 +93,9 @@ static_assert([] {
   }
   return true;
 }());
+
+// The name by which an OBJ of labels refers to the file of its materials.
+inline constexpr std::string_view kMaterialsName = "mesh.mtl";
 
 struct MeshFile {
   std::uint64_t bytes = 0;
@@ -122,8 +129,11 @@ struct LabelSummary {
   bool oriented = false;
   std::uint64_t components = 0;
   double area_mm2 = 0;
-  double volume_mm3 = 0;  // enclosed by the surface
+  double volume_mm3 = 0;  // enclosed by the surface, see encloses_volume()
   std::map<MeshFormat, LabelFile> files = {};
+
+  // An open surface encloses nothing: the sum over its triangles is no volume.
+  bool encloses_volume() const { return closed && oriented; }
 
   bool operator==(const LabelSummary&) const = default;
 };

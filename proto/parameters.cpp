@@ -36,6 +36,11 @@ Space space_of(MeshFormat format, const MeshParameters& parameters) {
 
 bool holds_all_labels(MeshFormat format) { return row_of(format).holds_all_labels; }
 
+std::string_view file_suffix(MeshFormat format) {
+  const FormatRow& row = row_of(format);
+  return row.file_suffix.empty() ? row.name : row.file_suffix;
+}
+
 std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
   if (!parameters.labels) return parameters.formats;
   std::vector<MeshFormat> files;

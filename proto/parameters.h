@@ -134,6 +134,9 @@ Space space_of(MeshFormat format, const MeshParameters& parameters);
 // True if one file of the format holds all labels.
 bool holds_all_labels(MeshFormat format);
 
+// The end of the names that are offered for files of that format, without the dot.
+std::string_view file_suffix(MeshFormat format);
+
 // The files of a job, in order: its formats. For a job by labels: the formats that hold all labels,
 // and a ZIP of the others.
 std::vector<MeshFormat> files_of(const MeshParameters& parameters);

@@ -117,7 +117,7 @@ std::vector<Output> outputs_from(const GivenOutputs& given) {
       check_new_folder(path);
       for (const MeshFormat format :
            given.formats.empty() ? std::vector{MeshFormat::kDrc} : given.formats) {
-        const std::string name = "{name}." + std::string(to_string(format));
+        const std::string name = "{name}." + std::string(file_suffix(format));
         outputs.push_back({fs::path(path) / name, format});
       }
       is_format_used = true;

@@ -136,17 +136,24 @@ void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
 }
 
 std::string labels_report(const std::vector<LabelSummary>& labels, const Units& in) {
+  bool are_closed = true;
   Rows rows = {{"label", "name", "triangles", in.cubic(), in.cubic() + " of voxels", "topology"}};
   for (const LabelSummary& label : labels) {
     std::string topology = label.closed ? "closed" : "open";
     if (!label.manifold) topology += ", not manifold";
     if (!label.oriented) topology += ", not oriented";
     rows.push_back({std::to_string(label.label), label.name.value_or(""), grouped(label.triangles),
-                    fixed(label.volume_mm3, 1), fixed(label.voxels_mm3, 1), topology});
+                    label.encloses_volume() ? fixed(label.volume_mm3, 1) : "none",
+                    fixed(label.voxels_mm3, 1), topology});
+    are_closed = are_closed && label.closed;
   }
-  return in_columns(
+  const std::string text = in_columns(
       {Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight, Align::kLeft},
       rows);
+  if (are_closed) return text;
+  return text +
+         "\n  An open label encloses no volume: it touches the volume's border. --close caps it "
+         "there.\n";
 }
 
 void write_paths(Json& place, const std::vector<std::filesystem::path>& paths) {

@@ -115,12 +115,24 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
                                         (label ? " of the label " + std::to_string(*label) : ""));
 }
 
+// The materials beside an OBJ. Control characters would end the line that names them.
+std::filesystem::path materials_beside(const std::filesystem::path& obj) {
+  std::string name = obj.filename().replace_extension(".mtl").string();
+  std::ranges::replace_if(
+      name, [](char c) { return static_cast<unsigned char>(c) < ' '; }, '_');
+  return obj.parent_path() / name;
+}
+
 // Writes a mesh as it arrives and checks it against the job's size and digest. Not thread safe.
 class Download {
  public:
-  Download(MeshFile announced, const std::filesystem::path& target,
+  // `materials`: the name that an OBJ of labels gets for its materials; empty for other files.
+  Download(MeshFile announced, const std::filesystem::path& target, std::string materials,
            const TransferProgress& progress)
-      : announced_(std::move(announced)), file_(target), progress_(progress) {}
+      : announced_(std::move(announced)),
+        file_(target),
+        materials_(std::move(materials)),
+        progress_(progress) {}
 
   // The request headers to resume a download; none if nothing has arrived.
   std::vector<std::pair<std::string, std::string>> headers() const {
@@ -136,32 +148,60 @@ class Download {
     file_.restart();
     sha256_.emplace();
     received_ = 0;
+    head_.clear();
   }
 
   // Throws Error kDigestMismatch for too many bytes.
   void take(std::string_view piece) {
     received_ += piece.size();
     if (received_ > announced_.bytes) refuse();
-    file_.write(piece);
     sha256_->update(piece);
+    write(piece);
     if (progress_) progress_(received_, announced_.bytes);
   }
 
-  // Throws Error kDigestMismatch for wrong bytes.
-  void publish() {
+  // Call when all has been taken. Throws Error kDigestMismatch for wrong bytes.
+  void check() {
     if (received_ != announced_.bytes || to_hex(sha256_->finish()) != announced_.sha256) refuse();
-    file_.publish();
+    if (received_ < kHeadBytes) write_head();
   }
 
+  // True if the file names materials.
+  bool has_materials() const { return has_materials_; }
+
+  void publish() { file_.publish(); }
+
  private:
+  // The line that names the materials ends before that.
+  static constexpr std::size_t kHeadBytes = 100;
+
   [[noreturn]] static void refuse() {
     throw Error(ErrorCode::kDigestMismatch,
                 "the received mesh does not match the checksum of the job");
   }
 
+  void write(std::string_view piece) {
+    const std::size_t missing = kHeadBytes - head_.size();
+    head_ += piece.substr(0, missing);
+    if (missing > 0 && head_.size() == kHeadBytes) write_head();
+    if (piece.size() > missing) file_.write(piece.substr(missing));
+  }
+
+  void write_head() {
+    std::string head = head_;
+    const std::string line = "\nmtllib " + std::string(kMaterialsName) + '\n';
+    const std::size_t found = materials_.empty() ? std::string::npos : head.find(line);
+    has_materials_ = found != std::string::npos;
+    if (has_materials_) head.replace(found, line.size(), "\nmtllib " + materials_ + '\n');
+    file_.write(head);
+  }
+
   const MeshFile announced_;
   PartFile file_;
+  const std::string materials_;
   const TransferProgress& progress_;
+  std::string head_;  // the first bytes of the file
+  bool has_materials_ = false;
   std::optional<Sha256> sha256_{std::in_place};
   std::uint64_t received_ = 0;
 };
@@ -305,11 +345,19 @@ void Client::fetch(const std::string& id, MeshFormat format, const std::filesyst
   if (done.mesh && done.mesh->labels_count && (label || !done.mesh->files.contains(format))) {
     done.mesh->labels = job_labels(id);
   }
-  Download download(file_of(done, format, label), target, progress);
+  const std::filesystem::path materials = materials_beside(target);
+  Download download(file_of(done, format, label), target,
+                    format == MeshFormat::kObj ? materials.filename().string() : "", progress);
   HttpRequest request{.target = mesh_path(path_segment(id), format, label)};
   request.sink = [&](std::string_view piece) { download.take(piece); };
   request.before_sink = [&](int status) { download.begin(status); };
   impl_->repeat(request, [&] { request.headers = download.headers(); });
+  download.check();
+  if (download.has_materials()) {
+    PartFile file(materials);
+    file.write(impl_->repeat({.target = job_path(id) + '/' + std::string(kMaterialsName)}));
+    file.publish();
+  }
   download.publish();
 }
 

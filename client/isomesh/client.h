@@ -183,7 +183,8 @@ class Client {
   // SHA-256 that the job states. Resumes after a broken connection. Throws kNotReady if the job has
   // not ended, the job's own error if it failed, kCancelled if it was cancelled, kNotFound if it
   // has no file of that format, kDigestMismatch for wrong bytes. For a job by labels, `label`
-  // selects one label's own surface.
+  // selects one label's own surface. An OBJ of all labels gets its materials beside it: for
+  // `x.obj` the file `x.mtl`, whose name replaces that in the OBJ.
   void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
              const TransferProgress& progress = {},
              std::optional<std::int64_t> label = std::nullopt);

@@ -91,6 +91,7 @@ const volumes = JSON.stringify(
 const stages = JSON.stringify(components.schemas.Stage.enum.filter((name) => name !== 'done'));
 const whole = JSON.stringify(components.schemas.MeshFormat['x-hold-all-labels']);
 const meshTitles = JSON.stringify(components.schemas.MeshFormat['x-titles'], null, 2);
+const meshSuffixes = JSON.stringify(components.schemas.MeshFormat['x-file-suffixes'], null, 2);
 mkdirSync(folder, { recursive: true });
 write(
   'parameters.ts',
@@ -101,6 +102,9 @@ export const wholeFormats: readonly string[] = ${whole};
 
 // What people call the formats of mesh files.
 export const meshFormatTitles: Readonly<Record<string, string>> = ${meshTitles};
+
+// The ends of names of mesh files that are not the format's name.
+export const meshFileSuffixes: Readonly<Record<string, string>> = ${meshSuffixes};
 
 // The stages of a job, in their order.
 export const stages: readonly string[] = ${stages};

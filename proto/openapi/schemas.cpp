@@ -103,6 +103,12 @@ std::string schema_of_mesh_formats() {
         yaml.line("'" + std::string(row.name) + "': " + std::string(row.title));
       }
     });
+    yaml.under("x-file-suffixes", [&] {
+      for (const FormatRow& row : kFormatRows) {
+        if (row.file_suffix.empty()) continue;
+        yaml.line("'" + std::string(row.name) + "': " + std::string(row.file_suffix));
+      }
+    });
   });
   return yaml.str();
 }

@@ -88,15 +88,18 @@ std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoPara
 // Binary STL, normals from the winding. Throws Error kTooLarge beyond 2^32 - 1 triangles.
 Encoder encode_stl;
 
-// Binary little-endian PLY: vertices as floats, faces as lists of unsigned 32-bit indices. Faces of
-// labels have an int property `label`.
+// Binary little-endian PLY: vertices as floats, faces as lists of unsigned 32-bit indices. Each
+// label has its own vertices, at the same positions as adjacent labels; they have its colour as
+// `red`, `green` and `blue`, and its value as `label`. Holds one label's surface in memory. Throws
+// Error kTooLarge beyond 2^32 - 1 vertices of labels.
 Encoder encode_ply;
 
-// OBJ: numbers as the shortest text that reads as the same float. Labels are groups of faces. A
-// group uses the material of the same name, but the file names no library (mtllib).
+// OBJ: numbers as the shortest text that reads as the same float. A label that has triangles is an
+// object and a group, with its own vertices at the same positions as adjacent labels. It uses the
+// material of the same name in the file kMaterialsName. Holds one label's surface in memory.
 Encoder encode_obj;
 
-// Geomview's OFF, as text: numbers as in OBJ.
+// Geomview's OFF, as text: numbers as in OBJ. Its comment is at the end.
 Encoder encode_off;
 
 // VTK's legacy file of polygonal data, binary (big-endian). The cell data `label` has the label of
@@ -108,8 +111,9 @@ Encoder encode_vtk;
 Encoder encode_vtp;
 
 // GIFTI 1.0 (Harwell and others, "GIFTI Surface Data Format", 2011): a surface in scanner
-// coordinates, RAS, its arrays in base64. An empty surface is a file without arrays. The metadata
-// has the members of asset.extras of GLB. Throws as encode_vtk does.
+// coordinates, RAS, its arrays in base64. Its structure is told as "Other". An empty surface is a
+// file without arrays. The metadata has the members of asset.extras of GLB. Throws as encode_vtk
+// does.
 Encoder encode_gii;
 
 // Binary glTF 2.0: one primitive per block of about 100 000 triangles, each a Draco stream of its

@@ -48,11 +48,15 @@ double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
          24 * as_double(surface.triangles);
 }
 
-std::uint64_t usd_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
-  // One label's surface can be almost everything.
+// For encoders that hold one label's surface, which can be almost everything.
+std::uint64_t label_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
   constexpr std::uint64_t kLabelPerTriangle = 30;
+  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
+}
+
+std::uint64_t usd_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
   return (parameters.normals ? surface.vertices * sizeof(mesh::Vec3) : 0) +
-         (parameters.labels ? surface.triangles * kLabelPerTriangle : 0);
+         label_memory(surface, parameters);
 }
 
 constexpr std::array kFormats = {
@@ -139,10 +143,13 @@ constexpr std::array kFormats = {
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
            .bytes =
-               [](const SurfaceSize& surface, const MeshParameters&) {
-                 return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 const double vertex_bytes = parameters.labels ? 19 : 12;
+                 return 300 + vertex_bytes * as_double(surface.vertices) +
+                        13 * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
+           .memory_bytes = label_memory,
            .encode = encode_ply},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
@@ -151,6 +158,7 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
+           .memory_bytes = label_memory,
            .encode = encode_obj},
     Format{.format = MeshFormat::k3mf,
            .media_type = "model/3mf",
@@ -159,12 +167,7 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 2000 + 18 * as_double(surface.vertices) + 7 * as_double(surface.triangles);
                },
-           .memory_bytes =
-               [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // One label's surface can be almost everything.
-                 constexpr std::uint64_t kLabelPerTriangle = 30;
-                 return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
-               },
+           .memory_bytes = label_memory,
            .shows_topology = [](const MeshParameters&) { return true; },
            .encode = encode_3mf},
     Format{.format = MeshFormat::kUsda,

@@ -25,7 +25,7 @@ struct Format {
   double milliseconds_per_triangle;
   // The estimated size of the file.
   double (*bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
-  // True if that is exact but for the header.
+  // True if that is exact but for the header, given the vertices and triangles of the file.
   bool has_exact_bytes = false;
   // The encoder's peak memory without the mesh; an upper estimate.
   std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface,

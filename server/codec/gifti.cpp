@@ -25,13 +25,20 @@ std::byte* write_record(const Record& record, std::byte* out) {
   return reinterpret_cast<std::byte*>(write_base64(bytes, reinterpret_cast<char*>(out)));
 }
 
-std::string array_head(std::string_view intent, std::string_view type, std::size_t rows) {
+std::string array_head(std::string_view intent, std::string_view type, std::size_t rows,
+                       std::string_view metadata) {
   return "<DataArray Intent=\"" + std::string(intent) + "\" DataType=\"" + std::string(type) +
          "\" ArrayIndexingOrder=\"RowMajorOrder\" Dimensionality=\"2\" Dim0=\"" +
          std::to_string(rows) +
          "\" Dim1=\"3\" Encoding=\"Base64Binary\" Endian=\"LittleEndian\" "
-         "ExternalFileName=\"\" ExternalFileOffset=\"\">\n<MetaData/>\n";
+         "ExternalFileName=\"\" ExternalFileOffset=\"\">\n" +
+         std::string(metadata);
 }
+
+// Connectome Workbench takes a surface without a structure for an invalid one.
+constexpr std::string_view kStructure =
+    "<MetaData>\n<MD><Name>AnatomicalStructurePrimary</Name><Value>Other</Value></MD>\n"
+    "</MetaData>\n";
 
 constexpr std::string_view kCoordinateSystem =
     "<CoordinateSystemTransformMatrix>\n"
@@ -63,14 +70,16 @@ std::optional<mesh::Topology> encode_gii(const FileContent& content, const mesh:
     put_text(sink, "</GIFTI>\n");
     return std::nullopt;
   }
-  put_text(sink, array_head("NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", vertices) +
+  put_text(sink, array_head("NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", vertices, kStructure) +
                      std::string(kCoordinateSystem) + "<Data>");
   BlockWriter writer(context, sink, vertices + triangles);
   writer.write(vertices, kRecordText + 1, [&](std::size_t v, std::byte* out) {
     return write_record(in_space(mesh.positions[v], content.space), out);
   });
-  put_text(sink, "</Data>\n</DataArray>\n" +
-                     array_head("NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", triangles) + "<Data>");
+  put_text(sink,
+           "</Data>\n</DataArray>\n" +
+               array_head("NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", triangles, "<MetaData/>\n") +
+               "<Data>");
   writer.write(triangles, kRecordText + 1,
                [&](std::size_t t, std::byte* out) { return write_record(mesh.triangles[t], out); });
   put_text(sink, "</Data>\n</DataArray>\n</GIFTI>\n");

@@ -128,7 +128,7 @@ std::vector<LabelFiles> encode_labels_zip(const LabelledSurface& surface,
       const std::string name = names.of(surface.labels[n]);
       for (std::size_t f = 0; f < formats.size(); ++f) {
         Encoded& file = encoded[n - begin][f];
-        const std::string suffix(to_string(formats[f]));
+        const std::string suffix(file_suffix(formats[f]));
         const std::uint64_t offset = zip.add(name + '.' + suffix, file.bytes);
         files[n][formats[f]] = {.bytes = file.bytes.size(),
                                 .sha256 = std::move(file.sha256),

@@ -1,4 +1,6 @@
+#include <numeric>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/codec/block_writer.h"
@@ -7,6 +9,7 @@
 #include "server/codec/label_titles.h"
 #include "server/codec/number_text.h"
 #include "server/codec/space.h"
+#include "server/mesh/labels/label_surface.h"
 
 namespace isomesh::codec {
 namespace {
@@ -25,15 +28,58 @@ std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* begin) {
   return reinterpret_cast<std::byte*>(out);
 }
 
-std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
+std::byte* write_obj_face(const mesh::Triangle& triangle, std::uint64_t first, std::byte* begin) {
   char* out = reinterpret_cast<char*>(begin);
   *out++ = 'f';
   for (const std::uint32_t vertex : triangle) {
     *out++ = ' ';
-    out = write_number(std::uint64_t{vertex} + 1, out);  // OBJ counts from 1
+    out = write_number(first + vertex, out);
   }
   *out++ = '\n';
   return reinterpret_cast<std::byte*>(out);
+}
+
+// Writes surfaces one after the other. OBJ counts the vertices of the whole file, from 1.
+class ObjWriter {
+ public:
+  ObjWriter(const FileContent& content, const mesh::Context& context, const Sink& sink,
+            std::size_t records)
+      : space_(content.space), sink_(sink), writer_(context, sink, records) {}
+
+  // `attributes` are the lines between the vertices and the faces.
+  void add(const mesh::Mesh& mesh, std::string_view attributes) {
+    writer_.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
+      return write_obj_vertex(in_space(mesh.positions[v], space_), out);
+    });
+    put_text(sink_, attributes);
+    writer_.write(mesh.triangles.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
+      return write_obj_face(mesh.triangles[t], first_, out);
+    });
+    first_ += mesh.positions.size();
+  }
+
+ private:
+  const Space space_;
+  const Sink& sink_;
+  BlockWriter writer_;
+  std::uint64_t first_ = 1;
+};
+
+void encode_obj_labels(const LabelledSurface& surface, const FileContent& content,
+                       const mesh::Context& context, const Sink& sink) {
+  put_text(sink, "mtllib " + std::string(kMaterialsName) + '\n');
+  const std::vector<std::size_t> vertices = vertices_of_labels(surface, context);
+  ObjWriter writer(content, context, sink,
+                   std::reduce(vertices.begin(), vertices.end()) + count_of(faces_of(content)));
+  ObjGroups groups;
+  mesh::Mesh mesh;
+  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
+    const std::string group = groups.of(surface.labels[n - 1]);
+    if (surface.triangles.of(n).empty()) continue;
+    extract_label(surface.walls, surface.triangles, n, mesh);
+    put_text(sink, "o " + group + '\n');
+    writer.add(mesh, "g " + group + "\nusemtl " + group + '\n');
+  }
 }
 
 }  // namespace
@@ -41,23 +87,14 @@ std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
 std::optional<mesh::Topology> encode_obj(const FileContent& content, const mesh::Context& context,
                                          const Sink& sink) {
   context.throw_if_stopped();
-  const mesh::Mesh& mesh = content.mesh;
   put_text(sink, "# isomesh, " + std::string(content.unit.name) + ", " +
                      std::string(letters_of(content.space)) + '\n');
-  const std::vector<FaceRun> runs = faces_of(content);
-  BlockWriter writer(context, sink, mesh.positions.size() + count_of(runs));
-  writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(in_space(mesh.positions[v], content.space), out);
-  });
-  ObjGroups groups;
-  for (std::size_t n = 0; n < runs.size(); ++n) {
-    if (content.labels != nullptr) {
-      const std::string group = groups.of(content.labels->labels[n]);
-      put_text(sink, "g " + group + "\nusemtl " + group + '\n');
-    }
-    writer.write(runs[n].count(), kMostObjFaceBytes,
-                 [&](std::size_t t, std::byte* out) { return write_obj_face(runs[n].at(t), out); });
+  if (content.labels != nullptr) {
+    encode_obj_labels(*content.labels, content, context, sink);
+    return std::nullopt;
   }
+  const mesh::Mesh& mesh = content.mesh;
+  ObjWriter(content, context, sink, mesh.positions.size() + mesh.triangles.size()).add(mesh, "");
   return std::nullopt;
 }
 

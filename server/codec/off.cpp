@@ -28,9 +28,7 @@ std::optional<mesh::Topology> encode_off(const FileContent& content, const mesh:
                                          const Sink& sink) {
   context.throw_if_stopped();
   const mesh::Mesh& mesh = content.mesh;
-  put_text(sink, "OFF\n# isomesh, " + std::string(content.unit.name) + ", " +
-                     std::string(letters_of(content.space)) + '\n' +
-                     std::to_string(mesh.positions.size()) + ' ' +
+  put_text(sink, "OFF\n" + std::to_string(mesh.positions.size()) + ' ' +
                      std::to_string(mesh.triangles.size()) + " 0\n");
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostVertexLineBytes, [&](std::size_t v, std::byte* out) {
@@ -43,6 +41,9 @@ std::optional<mesh::Topology> encode_off(const FileContent& content, const mesh:
     return reinterpret_cast<std::byte*>(
         write_numbers(std::uint64_t{a}, std::uint64_t{b}, std::uint64_t{c}, text));
   });
+  // A comment before the last face stops NiiVue, gmsh, meshio or trimesh.
+  put_text(sink, "# isomesh, " + std::string(content.unit.name) + ", " +
+                     std::string(letters_of(content.space)) + '\n');
   return std::nullopt;
 }
 

@@ -1,49 +1,130 @@
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
+#include <limits>
+#include <numeric>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "proto/error.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
 #include "server/codec/faces.h"
+#include "server/codec/label_titles.h"
 #include "server/codec/space.h"
+#include "server/mesh/labels/label_surface.h"
 
 namespace isomesh::codec {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the PLY written here is little-endian");
 
-constexpr std::size_t kFaceBytes = 1 + sizeof(mesh::Triangle);
+constexpr std::size_t kPlyFaceBytes = 1 + sizeof(mesh::Triangle);
 
-bool are_numbered(const FileContent& content) {
-  return content.labels != nullptr && label_type(*content.labels) == LabelType::kInt64;
+std::byte* write_ply_face(const mesh::Triangle& face, std::byte* out) {
+  *out = std::byte{3};
+  std::memcpy(out + 1, &face, sizeof face);
+  return out + kPlyFaceBytes;
 }
 
-// PLY has no integers of 64 bits. Faces of such labels have numbers from 1, and comments tell which
-// label each stands for.
-std::string numbered_labels(const FileContent& content) {
-  std::string comments;
-  if (!are_numbered(content)) return comments;
-  std::size_t number = 0;
-  for (const LabelSummary& label : content.labels->labels) {
-    comments +=
-        "comment label " + std::to_string(++number) + " is " + std::to_string(label.label) + '\n';
-  }
-  return comments;
+std::string ply_header(const FileContent& content, const std::string& comments,
+                       std::size_t vertices, const std::string& properties, std::size_t faces) {
+  return "ply\nformat binary_little_endian 1.0\ncomment isomesh, " +
+         std::string(content.unit.name) + ", " + std::string(letters_of(content.space)) + '\n' +
+         comments + "element vertex " + std::to_string(vertices) +
+         "\nproperty float x\nproperty float y\nproperty float z\n" + properties + "element face " +
+         std::to_string(faces) + "\nproperty list uchar uint vertex_indices\nend_header\n";
 }
 
-std::string ply_header(const FileContent& content, std::size_t faces) {
-  std::string header = "ply\nformat binary_little_endian 1.0\ncomment isomesh, " +
-                       std::string(content.unit.name) + ", " +
-                       std::string(letters_of(content.space)) + '\n' + numbered_labels(content) +
-                       "element vertex " + std::to_string(content.mesh.positions.size()) +
-                       "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-                       std::to_string(faces) + "\nproperty list uchar uint vertex_indices\n";
-  if (content.labels != nullptr) {
-    header += label_type(*content.labels) == LabelType::kInt32 ? "property int label\n"
-                                                               : "property uint label\n";
+// A vertex of a label's own surface.
+struct LabelVertex {
+  static constexpr std::size_t kBytes = sizeof(mesh::Vec3) + 3 + sizeof(std::uint32_t);
+
+  std::array<std::uint8_t, 3> color;
+  std::uint32_t label = 0;
+
+  std::byte* write(const mesh::Vec3& position, std::byte* out) const {
+    std::memcpy(out, &position, sizeof position);
+    out += sizeof position;
+    std::memcpy(out, color.data(), color.size());
+    out += color.size();
+    std::memcpy(out, &label, sizeof label);
+    return out + sizeof label;
   }
-  return header + "end_header\n";
+};
+
+std::array<std::uint8_t, 3> color_in_bytes(const LabelSummary& label) {
+  std::array<std::uint8_t, 3> bytes;
+  std::ranges::transform(color_of(label), bytes.begin(), [](double channel) {
+    return static_cast<std::uint8_t>(std::lround(channel * 255));
+  });
+  return bytes;
+}
+
+// PLY has no integers of 64 bits. Such labels have numbers from 1, and comments tell which label
+// each stands for.
+class LabelValues {
+ public:
+  explicit LabelValues(const LabelledSurface& surface)
+      : labels_(surface.labels), type_(label_type(surface)) {}
+
+  std::string comments() const {
+    std::string comments;
+    if (type_ != LabelType::kInt64) return comments;
+    for (std::size_t n = 0; n < labels_.size(); ++n) {
+      comments += "comment label " + std::to_string(n + 1) + " is " +
+                  std::to_string(labels_[n].label) + '\n';
+    }
+    return comments;
+  }
+  std::string property() const {
+    return type_ == LabelType::kInt32 ? "property int label\n" : "property uint label\n";
+  }
+  std::uint32_t of(std::size_t n) const {
+    return static_cast<std::uint32_t>(type_ == LabelType::kInt64 ? static_cast<std::int64_t>(n + 1)
+                                                                 : labels_[n].label);
+  }
+
+ private:
+  std::span<const LabelSummary> labels_;
+  LabelType type_;
+};
+
+// Labels are at vertices, because some readers fail at any property of faces beside the list.
+void encode_ply_labels(const LabelledSurface& surface, const FileContent& content,
+                       const mesh::Context& context, const Sink& sink) {
+  const std::vector<std::size_t> own = vertices_of_labels(surface, context);
+  const std::size_t vertices = std::reduce(own.begin(), own.end());
+  if (vertices > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::kTooLarge, "the labels have more vertices than a PLY file can number");
+  }
+  const std::size_t faces = count_of(faces_of(content));
+  const LabelValues values(surface);
+  put_text(sink, ply_header(content, values.comments(), vertices,
+                            "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
+                                values.property(),
+                            faces));
+  BlockWriter writer(context, sink, vertices + faces);
+  for (std::size_t n = 0; n < own.size(); ++n) {
+    const LabelVertex vertex = {color_in_bytes(surface.labels[n]), values.of(n)};
+    const auto chosen = vertices_of_label(surface.walls, surface.triangles, n + 1);
+    writer.write(chosen.size(), LabelVertex::kBytes, [&](std::size_t v, std::byte* out) {
+      return vertex.write(in_space(content.mesh.positions[chosen[v]], content.space), out);
+    });
+  }
+  std::uint32_t first = 0;
+  mesh::Mesh mesh;
+  for (std::size_t n = 0; n < own.size(); ++n) {
+    extract_label(surface.walls, surface.triangles, n + 1, mesh);
+    writer.write(mesh.triangles.size(), kPlyFaceBytes, [&](std::size_t t, std::byte* out) {
+      const auto& [a, b, c] = mesh.triangles[t];
+      return write_ply_face({first + a, first + b, first + c}, out);
+    });
+    first += static_cast<std::uint32_t>(own[n]);
+  }
 }
 
 }  // namespace
@@ -51,29 +132,21 @@ std::string ply_header(const FileContent& content, std::size_t faces) {
 std::optional<mesh::Topology> encode_ply(const FileContent& content, const mesh::Context& context,
                                          const Sink& sink) {
   context.throw_if_stopped();
+  if (content.labels != nullptr) {
+    encode_ply_labels(*content.labels, content, context, sink);
+    return std::nullopt;
+  }
   const mesh::Mesh& mesh = content.mesh;
-  const std::vector<FaceRun> runs = faces_of(content);
-  const std::size_t faces = count_of(runs);
-  put_text(sink, ply_header(content, faces));
-  BlockWriter writer(context, sink, mesh.positions.size() + faces);
+  put_text(sink, ply_header(content, "", mesh.positions.size(), "", mesh.triangles.size()));
+  BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), sizeof(mesh::Vec3), [&](std::size_t v, std::byte* out) {
     const mesh::Vec3 position = in_space(mesh.positions[v], content.space);
     std::memcpy(out, &position, sizeof position);
     return out + sizeof position;
   });
-  const std::size_t label_bytes = content.labels == nullptr ? 0 : sizeof(std::uint32_t);
-  const bool is_numbered = are_numbered(content);
-  std::uint32_t number = 0;
-  for (const FaceRun& run : runs) {
-    const auto label = is_numbered ? ++number : static_cast<std::uint32_t>(run.label());
-    writer.write(run.count(), kFaceBytes + label_bytes, [&](std::size_t t, std::byte* out) {
-      const mesh::Triangle face = run.at(t);
-      *out = std::byte{3};
-      std::memcpy(out + 1, &face, sizeof face);
-      std::memcpy(out + kFaceBytes, &label, label_bytes);
-      return out + kFaceBytes + label_bytes;
-    });
-  }
+  writer.write(mesh.triangles.size(), kPlyFaceBytes, [&](std::size_t t, std::byte* out) {
+    return write_ply_face(mesh.triangles[t], out);
+  });
   return std::nullopt;
 }
 

@@ -183,6 +183,35 @@ TEST_F(CommandTest, AMemberThatCannotBeMeshedKeepsNoOtherFromIt) {
   EXPECT_THAT(outputs(), ElementsAre("s-ct.glb", "s-x.glb"));
 }
 
+TEST_F(CommandTest, AnObjOfLabelsHasItsMaterialsBesideIt) {
+  std::string samples(1000, '\0');
+  for (const std::size_t at : {444, 445, 454, 455, 544, 545, 554, 555}) samples[at] = '\1';
+  for (const std::size_t at : {446, 447, 456, 457, 546, 547, 556, 557}) samples[at] = '\2';
+  write_file(folder_ / "two.raw", samples);
+  fs::create_directory(folder_ / "out");
+  const std::string mesh = "mesh @two.raw --dims 10,10,10 --type uint8 --spacing 1,1,1 ";
+  const Finished made = command(mesh + "--labels all --label-color 2=#ff0080 -o @out/x.obj");
+  EXPECT_EQ(made.status, 0) << made.errors;
+  EXPECT_THAT(outputs(), ElementsAre("x.mtl", "x.obj"));
+  const std::string obj = read_file(folder_ / "out/x.obj");
+  EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, LPS\nmtllib x.mtl\no label_1\nv "));
+  const std::string materials = read_file(folder_ / "out/x.mtl");
+  EXPECT_THAT(materials, HasSubstr("newmtl label_2\nKd 1.000000 0.000000 0.501961\n"));
+  // Nothing else of the file changes, and standard output gets it as the server has it.
+  const Finished printed =
+      command("--quiet " + mesh + "--labels all --label-color 2=#ff0080 -o - --format obj");
+  std::string served = obj;
+  served.replace(served.find("x.mtl"), 5, "mesh.mtl");
+  EXPECT_EQ(printed.output, served);
+  command(mesh + "--iso 0.5 -o @out/y.obj");
+  EXPECT_THAT(outputs(), ElementsAre("x.mtl", "x.obj", "y.obj"));
+}
+
+TEST_F(CommandTest, AFolderHasAGiftiUnderANameThatTellsThatItIsASurface) {
+  EXPECT_EQ(command("mesh @sphere.raw $raw --iso 100 -o @out/ --format gii").status, 0);
+  EXPECT_THAT(outputs(), ElementsAre("sphere.surf.gii"));
+}
+
 TEST_F(CommandTest, ADryRunLeavesNothingBehind) {
   const std::string dry_run = "mesh @sphere.raw $raw --dry-run --iso ";
   const Finished dry = command(dry_run + "100 --format stl");

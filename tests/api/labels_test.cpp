@@ -134,6 +134,29 @@ TEST_F(LabelsTest, OneLabelsFileIsAFileOfItsOwn) {
   EXPECT_EQ(zip.body.substr(file.offset, file.bytes), answer.body);
 }
 
+TEST_F(LabelsTest, TheMaterialsOfAnObjAreBesideIt) {
+  const Job job = made(
+      R"("labels": "all", "formats": ["obj"], "label_names": {"7": "Right side"},
+         "label_colors": {"7": "#ff0080"})");
+  const Answer materials = mesh(job, "mtl");
+  EXPECT_EQ(materials.status, 200);
+  EXPECT_EQ(materials.header("content-type"), "model/mtl");
+  EXPECT_THAT(materials.header("content-disposition"), HasSubstr("mesh.mtl"));
+  EXPECT_THAT(materials.body, HasSubstr("newmtl label_3\nKd 0."));
+  EXPECT_THAT(materials.body, HasSubstr("newmtl Right_side\nKd 1.000000 0.000000 0.501961\n"));
+  EXPECT_EQ(mesh(job, "mtl", {{"If-None-Match", materials.header("etag")}}).status, 304);
+  EXPECT_THAT(mesh(job, "obj").body, HasSubstr("\nmtllib mesh.mtl\n"));
+  const Job surface = finished_job(daemon_);
+  EXPECT_EQ(mesh(surface, "mtl").status, 200);
+  EXPECT_EQ(mesh(surface, "mtl").body, "");
+}
+
+TEST_F(LabelsTest, AGiftiIsOfferedByANameThatTellsThatItIsASurface) {
+  const Job job = made(R"("labels": "all", "formats": ["gii"])");
+  EXPECT_THAT(mesh(job, "gii?label=7").header("content-disposition"),
+              HasSubstr("\"mesh-7.surf.gii\""));
+}
+
 TEST_F(LabelsTest, WhatHoldsOneLabelHasToBeToldWhich) {
   const Job job = made(R"("labels": "all", "formats": ["stl"], "label_names": {"7": "Right"})");
   const Answer which = mesh(job, "stl");

@@ -189,11 +189,13 @@ void probe_jobs(Statuses& statuses, const Job& job) {
 }
 
 void probe_job_labels(Statuses& statuses, const Job& job, const Job& running) {
-  const std::string get = "GET /v1/jobs/{id}/labels";
-  const std::string list = "/v1/jobs/" + job.id + "/labels";
-  statuses.probe(get, list);
-  statuses.probe(get, "/v1/jobs/" + running.id + "/labels");
-  statuses.probe_one(get, list, job.id);
+  for (const std::string part : {"/labels", "/mesh.mtl"}) {
+    const std::string get = "GET /v1/jobs/{id}" + part;
+    const std::string path = "/v1/jobs/" + job.id + part;
+    statuses.probe(get, path);
+    statuses.probe(get, "/v1/jobs/" + running.id + part);
+    statuses.probe_one(get, path, job.id);
+  }
 }
 
 void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {

@@ -3,6 +3,7 @@
 import contextlib
 import copy
 import io
+import json
 import pickle
 import subprocess
 import sys
@@ -218,6 +219,53 @@ class Jobs(DaemonTest):
         used = numpy.unique(of_label.faces)
         outward = mesh.vertices[used] - mesh.vertices[used].mean(0)
         self.assertGreater(numpy.einsum("ij,ij->i", outward, of_label.normals[used]).min(), 0)
+
+    def test_each_label_has_vertices_and_colors_of_its_own(self):
+        samples = numpy.zeros((12, 12, 12), "uint8")
+        samples[2:6, 2:10, 2:10], samples[6:10, 2:10, 2:10] = 3, 7
+        mesh = self.client.mesh(samples, labels="all", label_colors={7: "#ff0080"})
+        used = [numpy.unique(mesh.faces[mesh.labels == label]) for label in (3, 7)]
+        self.assertEqual(numpy.concatenate(used).tolist(), list(range(len(mesh.vertices))))
+        self.assertEqual(numpy.unique(mesh.colors[used[1]], axis=0).tolist(), [[255, 0, 128]])
+        self.assertEqual((mesh.colors.dtype, mesh.colors.shape), ("uint8", mesh.vertices.shape))
+        shared = {tuple(each) for each in mesh.vertices[used[0]]} & {tuple(each) for each in mesh.vertices[used[1]]}
+        self.assertGreater(len(shared), 9)
+        outward = mesh.vertices[used[0]] - mesh.vertices[used[0]].mean(0)
+        self.assertGreater(numpy.einsum("ij,ij->i", outward, mesh.normals[used[0]]).min(), 0)
+        # The file is the server's to the byte, also without numpy.
+        ours, theirs = mesh.save(self.folder / "own.ply"), self.client.download(mesh.job, self.folder / "server.ply")
+        self.assertEqual(ours.read_bytes(), theirs.read_bytes())
+        script = """
+import json, sys
+sys.modules["numpy"] = None
+import isomesh
+mesh = isomesh.read_ply(sys.argv[1])
+mesh.in_space("ras").in_space("lps").save(sys.argv[2])
+print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
+"""
+        plain = self.folder / "plain.ply"
+        found = subprocess.run([sys.executable, "-c", script, theirs, plain], check=True, capture_output=True, text=True)
+        labels, colors = json.loads(found.stdout)
+        self.assertEqual((labels, colors), (mesh.labels.tolist(), mesh.colors.tolist()))
+        self.assertEqual(plain.read_bytes(), theirs.read_bytes())
+        mesh.colors = mesh.colors[1:]
+        with self.assertRaisesRegex(ValueError, "colors for .* vertices; set colors to None"):
+            mesh.save(plain)
+        mesh.colors = None
+        self.assertIsNone(isomesh.read_ply(mesh.save(plain)).colors)
+        self.assertEqual(isomesh.read_ply(plain).labels.tolist(), mesh.labels.tolist())
+
+    def test_an_obj_of_labels_has_its_materials_beside_it(self):
+        samples = numpy.zeros((12, 12, 12), "uint8")
+        samples[2:6, 2:10, 2:10], samples[6:10, 2:10, 2:10] = 3, 7
+        mesh = self.client.mesh(samples, labels="all", label_colors={7: "#ff0080"}, formats=["obj"])
+        lines = mesh.save(self.folder / "two labels.obj").read_text().splitlines()
+        self.assertEqual(lines[:3], ["# isomesh, millimetres, LPS", "mtllib two labels.mtl", "o label_3"])
+        self.assertEqual(sum(line.startswith("f ") for line in lines), len(mesh.faces))
+        materials = (self.folder / "two labels.mtl").read_text()
+        self.assertIn("newmtl label_7\nKd 1.000000 0.000000 0.501961\n", materials)
+        self.client.mesh(ball(), iso=-8, formats=["obj"]).save(self.folder / "ball.obj")
+        self.assertFalse((self.folder / "ball.mtl").exists())
 
     def test_normals_and_bounds_are_the_servers(self):
         mesh = self.client.mesh(ball(), iso=-8, passes=0)

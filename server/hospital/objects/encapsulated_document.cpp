@@ -133,7 +133,7 @@ void add_references(const DocumentObject& object, DataSet& data) {
     DataSet materials = reference_to(sop_class_of(DocumentKind::kMtl), object.materials_uid);
     series.push_back(series_item(object.series_uid, {materials}));
     materials.set(0x00687005, "UR",
-                  kMaterialsUri);                // RelativeURIReferenceWithinEncapsulatedDocument
+                  kMaterialsName);               // RelativeURIReferenceWithinEncapsulatedDocument
     data.set_sequence(0x0008114A, {materials});  // ReferencedInstanceSequence
   }
   data.set_sequence(0x00081115, series);  // ReferencedSeriesSequence

@@ -26,9 +26,6 @@ std::string_view sop_class_of(DocumentKind kind);
 // "Encapsulated OBJ" for the SOP class of that storage. Throws Error kInternal for another class.
 std::string_view name_of_class(std::string_view sop_class);
 
-// The name by which an OBJ refers to its materials.
-inline constexpr std::string_view kMaterialsUri = "materials.mtl";
-
 // The largest even length of an element of explicit length.
 inline constexpr std::uint64_t kMostDocumentBytes = 4'294'967'294;
 
@@ -47,7 +44,7 @@ struct DocumentObject {
   std::string algorithm_parameters;  // JSON
   // The segment of the mesh; empty for a mesh at an iso-value, and for several segments.
   std::optional<DicomSegment> segment = {};
-  // The Encapsulated MTL in the same series that the OBJ names kMaterialsUri; empty: none.
+  // The Encapsulated MTL in the same series that the OBJ names kMaterialsName; empty: none.
   std::string materials_uid = {};
 };
 

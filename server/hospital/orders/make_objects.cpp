@@ -10,7 +10,6 @@
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
-#include "server/codec/label_titles.h"
 #include "server/hospital/objects/encapsulated_document.h"
 #include "server/hospital/objects/uid.h"
 #include "server/jobs/library/label_pages.h"
@@ -18,7 +17,7 @@
 namespace isomesh::orders {
 namespace {
 
-// The document of one object: a text, then the bytes of a file within a blob.
+// The document of one object: a text, or the bytes of a file within a blob.
 struct Document {
   dicom::DocumentKind kind = dicom::DocumentKind::kStl;
   MeshFormat format = MeshFormat::kStl;  // the format to send that it is made for
@@ -81,14 +80,10 @@ std::vector<Document> obj_documents(const Job& job, const store::BlobStore& blob
   if (!job.parameters.labels) return {mesh};
   Document materials = {
       .kind = dicom::DocumentKind::kMtl, .format = MeshFormat::kObj, .sha256 = {}, .number = 2};
-  codec::ObjGroups groups;
-  std::uint64_t count = 0;
-  for_each_label(job, blobs, [&](const LabelSummary& label) {
-    materials.text += codec::mtl_material(groups.of(label), label);
-    mesh.segment = ++count == 1 ? std::optional(label.label) : std::nullopt;
-  });
+  const jobs::JobLabels labels(job, blobs);
+  if (labels.count() == 1) mesh.segment = labels.after(std::nullopt).front().label;
+  materials.text = jobs::materials_of(labels);
   materials.sha256 = sha256_of(materials.text);
-  mesh.text = "mtllib " + std::string(dicom::kMaterialsUri) + '\n';
   mesh.sha256 += materials.sha256;
   return {materials, mesh};
 }

@@ -156,7 +156,7 @@ bool is_zipped(const jobs::JobLabels& labels, MeshFormat format) {
 
 Stored stored_mesh(const App& app, const Job& job, const WhichMesh& which) {
   const MeshSummary& mesh = *job.mesh;
-  const std::string suffix(to_string(which.format));
+  const std::string suffix(file_suffix(which.format));
   const auto whole = mesh.files.find(which.format);
   if (!which.label && whole != mesh.files.end()) {
     const MeshFile& file = whole->second;
@@ -171,7 +171,8 @@ Stored stored_mesh(const App& app, const Job& job, const WhichMesh& which) {
               "mesh-" + std::to_string(label.label) + '.' + suffix};
     }
   }
-  throw Error(ErrorCode::kNotFound, "the job was submitted without the format \"" + suffix + '"' +
+  throw Error(ErrorCode::kNotFound, "the job was submitted without the format \"" +
+                                        std::string(to_string(which.format)) + '"' +
                                         (which.label ? " for each label" : ""));
 }
 
@@ -211,6 +212,15 @@ void list_labels(const App& app, const Request& request, Response& response) {
   const bool has_more = !page.empty() && labels.has_after(page.back().label);
   const std::string next = has_more ? cursor_after(kCursor, std::to_string(page.back().label)) : "";
   answer_tagged_json(request, response, to_json(page, next));
+}
+
+void answer_materials(const App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
+  check_has_mesh(job);
+  response.set_header("Content-Disposition",
+                      "attachment; filename=\"" + std::string(kMaterialsName) + '"');
+  answer_tagged(request, response, jobs::materials_of(labels_of(app, job)), "model/mtl");
 }
 
 }  // namespace
@@ -257,6 +267,10 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
 }
 
 void add_mesh_routes(App& app) {
+  // Before the route of mesh files, whose pattern matches it, too.
+  add_computed_get(
+      app, "/v1/jobs/{id}/" + std::string(kMaterialsName),
+      [&app](const auto& request, auto& response) { answer_materials(app, request, response); });
   add_get(app, "/v1/jobs/{id}/mesh.{format}", [&app](const auto& request, auto& response) {
     check_known(request, {"label"});
     const auto format = from_string<MeshFormat>(request.path_parameter("format"));

@@ -69,10 +69,15 @@ bool is_known(const Request& request, Response& response, const std::string& eta
   return true;
 }
 
-void answer_tagged_json(const Request& request, Response& response, const std::string& json) {
-  if (is_known(request, response, etag_of(json), kAskEachTime)) return;
+void answer_tagged(const Request& request, Response& response, const std::string& text,
+                   const char* media_type) {
+  if (is_known(request, response, etag_of(text), kAskEachTime)) return;
   response.status = 200;
-  response.set_body(json, "application/json");
+  response.set_body(text, media_type);
+}
+
+void answer_tagged_json(const Request& request, Response& response, const std::string& json) {
+  answer_tagged(request, response, json, "application/json");
 }
 
 net::FairPlaces::Place place_for_upload(App& app, const Request& request) {

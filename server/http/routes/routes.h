@@ -70,6 +70,8 @@ inline constexpr const char* kAskEachTime = "private, no-cache";
 bool is_known(const Request& request, Response& response, const std::string& etag,
               const char* cache_control);
 // Answers 200, or 304 if the client has the content already. Throws Error kPreconditionFailed.
+void answer_tagged(const Request& request, Response& response, const std::string& text,
+                   const char* media_type);
 void answer_tagged_json(const Request& request, Response& response, const std::string& json);
 // The allowed numbers of entries in one response, and the default.
 inline constexpr WholeNumbers kListLengths = {1, limits::kMostListed};

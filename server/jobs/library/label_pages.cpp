@@ -6,6 +6,7 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/codec/label_titles.h"
 #include "server/jobs/limits.h"
 
 namespace isomesh::jobs {
@@ -153,6 +154,16 @@ std::optional<LabelSummary> JobLabels::find(std::int64_t label) const {
     return is_there ? std::optional(*found) : std::nullopt;
   };
   return file_ ? found_in(page(page_of(label))) : found_in(job_.mesh->labels);
+}
+
+std::string materials_of(const JobLabels& labels) {
+  std::string text;
+  codec::ObjGroups groups;
+  std::vector<LabelSummary> page = labels.after(std::nullopt);
+  for (; !page.empty(); page = labels.after(page.back().label)) {
+    for (const LabelSummary& label : page) text += codec::mtl_material(groups.of(label), label);
+  }
+  return text;
 }
 
 }  // namespace isomesh::jobs

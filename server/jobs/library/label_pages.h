@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "proto/types.h"
@@ -58,5 +59,9 @@ class JobLabels {
   std::vector<Page> pages_;
   std::uint64_t end_of_pages_ = 0;
 };
+
+// The materials of the job's OBJ, in the form of its file kMaterialsName; empty for a job at an
+// iso-value. Throws as JobLabels does.
+std::string materials_of(const JobLabels& labels);
 
 }  // namespace isomesh::jobs

@@ -24,11 +24,11 @@ struct PipelineLimits {
 
 // A part of the key of a result. Increment whenever the same volume and parameters would give
 // different bytes than before.
-inline constexpr const char* kMesherVersion = "1";
+inline constexpr const char* kMesherVersion = "2";
 
 // Increment with kMesherVersion, and whenever jobs can ask for something new: in an upgrade, the
 // older daemons that share the queue leave newer jobs to newer daemons.
-inline constexpr int kJobVersion = 1;
+inline constexpr int kJobVersion = 2;
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the
 // results as data of `owner`. The same volume and parameters give the same bytes. Throws Error

@@ -80,7 +80,7 @@ def read_obj(data):
     lines = data.decode("utf-8").splitlines()
     points = numbers(" ".join(line[2:] for line in lines if line.startswith("v ")))
     faces = numbers(" ".join(line[2:] for line in lines if line.startswith("f ")), int)
-    known = {"v", "f", "#", "g", "usemtl", "mtllib", ""}
+    known = {"v", "f", "#", "o", "g", "usemtl", "mtllib", ""}
     if strange := {line.split(" ", 1)[0] for line in lines} - known:
         raise Unreadable(f"lines begin with {strange}")
     return [Part(points, faces - 1)]

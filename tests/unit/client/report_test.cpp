@@ -84,6 +84,20 @@ TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
   EXPECT_THAT(report, Not(HasSubstr("1,234.5")));
 }
 
+// The sum over the triangles of an open surface may even be negative.
+TEST(MeshReport, SaysThatAnOpenLabelEnclosesNothing) {
+  MeshSummary mesh;
+  mesh.labels = {{.label = 1, .closed = true, .oriented = true, .volume_mm3 = 27}};
+  EXPECT_THAT(mesh_report(mesh), Not(HasSubstr("open label")));
+  mesh.labels.push_back({.label = 2, .closed = false, .oriented = true, .volume_mm3 = -823});
+  const std::string report = mesh_report(mesh);
+  EXPECT_THAT(report, HasSubstr(" 27.0 "));
+  EXPECT_THAT(report, HasSubstr(" none "));
+  EXPECT_THAT(report, Not(HasSubstr("823")));
+  EXPECT_THAT(report, HasSubstr("An open label encloses no volume: it touches the volume's border. "
+                                "--close caps it there.\n"));
+}
+
 TEST(MeshReport, IsInTheUnitOfTheVolume) {
   MeshSummary mesh;
   mesh.area_extracted_mm2 = 12;

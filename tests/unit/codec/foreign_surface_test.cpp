@@ -66,6 +66,7 @@ TEST(PythonReaderOfProvenance, GiftiSaysItInItsMetadata) {
   const auto told =
       read_with_python(encoded(mesh, MeshFormat::kGii, known()), MeshFormat::kGii).told;
   EXPECT_EQ(told["dataspace"], "NIFTI_XFORM_SCANNER_ANAT");
+  EXPECT_EQ(told["AnatomicalStructurePrimary"], "Other");
   const auto json = nlohmann::json::parse(told["isomesh:provenance"].get<std::string>());
   EXPECT_EQ(json["samples"], "abc");
   EXPECT_EQ(json["notes"][0]["detail"], "a < b & c ]]> d");

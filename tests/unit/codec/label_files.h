@@ -59,6 +59,12 @@ class LabelFilesTest : public testing::Test {
     return bytes;
   }
 
+  std::size_t faces_of_all() const {
+    std::size_t faces = 0;
+    for (const LabelSummary& label : labels_) faces += label.triangles;
+    return faces;
+  }
+
   struct Zip {
     std::string bytes;
     std::vector<codec::LabelFiles> files;

@@ -102,6 +102,11 @@ TEST_F(LabelFilesTest, NoNameInAZipIsADeviceOfWindows) {
                                                    "com10.stl", "console.stl"));
 }
 
+// Connectome Workbench tells what a GIFTI file is by its name.
+TEST_F(LabelFilesTest, GiftiInAZipIsNamedAsASurface) {
+  EXPECT_TRUE(unzipped(zipped({MeshFormat::kGii}).bytes).contains("label 1.surf.gii"));
+}
+
 TEST_F(LabelFilesTest, NamesInAZipAreNoLongerThanSystemsTake) {
   labels_[0].name = std::string(254, 'x');
   labels_[1].name = std::string(254, 'x') + 'y';
@@ -117,6 +122,7 @@ TEST_F(LabelFilesTest, GroupsOfLabelsThatAreNamedAlikeAreTold) {
   labels_[0].name = "a b";
   labels_[3].name = "a_b";
   const std::string obj = encoded(MeshFormat::kObj);
+  EXPECT_NE(obj.find("o a_b\n"), std::string::npos);
   EXPECT_NE(obj.find("g a_b\n"), std::string::npos);
   EXPECT_NE(obj.find("g a_b-4\n"), std::string::npos);
   EXPECT_NE(obj.find("usemtl a_b-4\n"), std::string::npos);
@@ -211,18 +217,38 @@ TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
   EXPECT_NE(glb.find("label 3"), std::string::npos);
   EXPECT_EQ(unzipped(zipped({MeshFormat::kStl}).bytes).at("label 3.stl").size(), 84U);
   EXPECT_NE(encoded(MeshFormat::kPly).find("element face 0"), std::string::npos);
+  EXPECT_EQ(encoded(MeshFormat::kObj), "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n");
   EXPECT_TRUE(test::read_with_lib3mf(encoded(MeshFormat::k3mf)).objects.empty());
 }
 
-TEST_F(LabelFilesTest, PlyHasEveryLabelsFacesWithItsValue) {
+// Some readers fail at a property of faces beside the list of their vertices.
+TEST_F(LabelFilesTest, PlyHasEveryLabelsOwnVerticesWithItsColourAndValue) {
   const std::string ply = encoded(MeshFormat::kPly);
-  EXPECT_NE(ply.find("property int label\nend_header\n"), std::string::npos);
-  std::size_t at = ply.find("end_header\n") + 11 + 12 * walls_.mesh.positions.size();
+  const std::string end =
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int label\n"
+      "element face " +
+      std::to_string(faces_of_all()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
+  const std::size_t found = ply.find(end);
+  ASSERT_NE(found, std::string::npos) << ply.substr(0, 500);
+  std::size_t at = found + end.size();
+  std::vector<std::int32_t> label_of_vertex;
+  for (const LabelSummary& label : labels_) {
+    for (std::uint64_t v = 0; v < label.vertices; ++v, at += 19) {
+      std::memcpy(&label_of_vertex.emplace_back(), ply.data() + at + 15, sizeof(std::int32_t));
+      EXPECT_EQ(label_of_vertex.back(), label.label);
+      if (label.color) {
+        EXPECT_EQ(ply.substr(at + 12, 3), std::string("\xff\x80\0", 3));
+      }
+    }
+  }
   std::map<std::int32_t, std::uint64_t> faces;
-  for (; at + 17 <= ply.size(); at += 17) {
+  for (; at + 13 <= ply.size(); at += 13) {
     EXPECT_EQ(ply[at], 3);
-    std::int32_t label = 0;
-    std::memcpy(&label, ply.data() + at + 13, sizeof label);
+    mesh::Triangle corners;
+    std::memcpy(&corners, ply.data() + at + 1, sizeof corners);
+    const std::int32_t label = label_of_vertex.at(corners[0]);
+    EXPECT_EQ(label_of_vertex.at(corners[1]), label);
+    EXPECT_EQ(label_of_vertex.at(corners[2]), label);
     ++faces[label];
   }
   EXPECT_EQ(at, ply.size());
@@ -232,14 +258,15 @@ TEST_F(LabelFilesTest, PlyHasEveryLabelsFacesWithItsValue) {
 }
 
 // PLY has no such integers.
-TEST_F(LabelFilesTest, FacesHaveLabelsOf64Bits) {
+TEST_F(LabelFilesTest, LabelsMayHave64Bits) {
   constexpr std::int64_t kId = 720575940618780781;
   labels_.back().label = kId;
   const std::string ply = encoded(MeshFormat::kPly);
   EXPECT_NE(ply.find("comment label 5 is 720575940618780781\n"), std::string::npos);
-  EXPECT_NE(ply.find("property uint label\nend_header\n"), std::string::npos);
+  EXPECT_NE(ply.find("property uint label\nelement face "), std::string::npos);
   std::uint32_t number = 0;
-  std::memcpy(&number, ply.data() + ply.size() - sizeof number, sizeof number);
+  const std::size_t end_of_vertices = ply.size() - 13 * faces_of_all();
+  std::memcpy(&number, ply.data() + end_of_vertices - sizeof number, sizeof number);
   EXPECT_EQ(number, 5U);
   std::int64_t label = 0;
   const std::string vtk = encoded(MeshFormat::kVtk);
@@ -252,6 +279,32 @@ TEST_F(LabelFilesTest, FacesHaveLabelsOf64Bits) {
   std::memcpy(&label, vtp.data() + end - sizeof label, sizeof label);
   EXPECT_EQ(label, kId);
   EXPECT_NE(encoded(MeshFormat::kGlb).find("\"label\":\"720575940618780781\""), std::string::npos);
+}
+
+// Blender makes an object of each `o`, and drops a face whose vertices another face has, too.
+TEST_F(LabelFilesTest, ObjHasAnObjectWithVerticesOfItsOwnForEachLabel) {
+  const std::string obj = encoded(MeshFormat::kObj);
+  EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, LPS\nmtllib mesh.mtl\no label_1\nv "));
+  std::istringstream lines(obj);
+  std::size_t objects = 0;
+  std::uint64_t first = 1;
+  std::uint64_t vertices = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("o ")) {
+      first += vertices;
+      vertices = 0;
+      ++objects;
+    }
+    if (line.starts_with("v ")) ++vertices;
+    if (!line.starts_with("f ")) continue;
+    EXPECT_EQ(vertices, labels_.at(objects - 1).vertices);
+    std::istringstream corners(line.substr(2));
+    for (std::uint64_t corner = 0; corners >> corner;) {
+      EXPECT_GE(corner, first);
+      EXPECT_LT(corner, first + vertices);
+    }
+  }
+  EXPECT_EQ(objects, kLabels);
 }
 
 TEST_F(LabelFilesTest, ObjHasAGroupForEachLabel) {

@@ -124,13 +124,13 @@ TEST_F(EnvelopeTest, OfASegmentHasItsCodes) {
 }
 
 TEST_F(EnvelopeTest, OfAnObjRefersToItsMaterialsByUidAndName) {
-  EXPECT_THAT(made(84).before, Not(HasSubstr("materials.mtl")));
+  EXPECT_THAT(made(84).before, Not(HasSubstr("mesh.mtl")));
   kind_ = DocumentKind::kObj;
   materials_ = "2.25.3";
   const Envelope envelope = made(84);
   EXPECT_THAT(envelope.before, HasSubstr("1.2.840.10008.5.1.4.1.1.104.4"));
   EXPECT_THAT(envelope.before, HasSubstr("1.2.840.10008.5.1.4.1.1.104.5"));
-  EXPECT_THAT(envelope.before, HasSubstr(std::string("UR\0\0\x0E\0\0\0materials.mtl ", 22)));
+  EXPECT_THAT(envelope.before, HasSubstr(std::string("UR\0\0\x08\0\0\0mesh.mtl", 16)));
   EXPECT_THAT(envelope.after, HasSubstr("model/obj"));
 }
 

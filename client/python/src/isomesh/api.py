@@ -744,7 +744,9 @@ class LabelSummary(TypedDict):
     oriented: bool
     components: int
     area_mm2: float
-    #: The volume that the surface encloses.
+    #: The volume that the surface encloses, if it is closed and oriented. Otherwise the number
+    #: depends on the point of reference and may be negative: the label touches the border of the
+    #: volume. See the parameter close.
     volume_mm3: float
     #: The label's files in the ZIP, one for each format.
     files: Mapping[str, LabelFile]

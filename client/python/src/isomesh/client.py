@@ -9,7 +9,7 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
+from typing import IO, TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
 from . import answers, busy, ply, uploads
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _LONGEST_WAIT = 30.0  # seconds, the server's
 _SHORTEST_LOOK = 0.2
 _LOOKS_LIKE_LABELS = "looks-like-labels"
+_LONGEST_OBJ_HEAD = 100  # bytes, with the line that names the materials
 
 
 class Client:
@@ -344,7 +345,8 @@ class Client:
     ) -> Path:
         """Writes a file of the job to `path` and returns that path. The suffix selects the format.
         `label` selects one label's own surface. The file appears only when it is complete and matches
-        the job's SHA-256."""
+        the job's SHA-256. An OBJ of all labels gets its materials beside it: for `x.obj` the file
+        `x.mtl`, whose name replaces that in the OBJ."""
         target = Path(path)
         done = self.job(job) if isinstance(job, str) else job
         form = format_of(target)
@@ -359,6 +361,8 @@ class Client:
                 file.write(piece)
 
             self._exchange.download(announced, write)
+            if form == "obj":
+                self._add_materials(done["id"], file, target)
         return target
 
     # --- How -------------------------------------------------------------------------------------
@@ -412,10 +416,25 @@ class Client:
         key = idempotency_key or uuid.uuid4().hex
         return cast("api.Job", self._exchange.send_json("POST", "/v1/jobs", value, answers.JOB, key))
 
+    def _add_materials(self, job: str, obj: IO[bytes], target: Path) -> None:
+        """Writes the materials that an OBJ names beside it, and gives their name to the OBJ."""
+        obj.seek(0)
+        head, line = obj.read(_LONGEST_OBJ_HEAD), b"\nmtllib mesh.mtl\n"
+        if line not in head:
+            return
+        # A control character would end the line.
+        beside = target.with_name(re.sub("[\0-\x1f]", "_", target.with_suffix(".mtl").name))
+        with written(beside) as file:
+            file.write(self._exchange.text(f"/v1/jobs/{quote(job, safe='')}/mesh.mtl"))
+        text = head.replace(line, b"\nmtllib " + os.fsencode(beside.name) + b"\n", 1) + obj.read()
+        obj.seek(0)
+        obj.write(text)
+        obj.truncate()
+
     def _fetch(self, job: api.SucceededJob, notes: Sequence[api.Note]) -> Mesh:
         data = bytearray()
         self._exchange.download(file_of(job, "ply"), lambda at, piece: _put(data, at, piece))
-        return Mesh(*ply.parse(data), job=job, notes=notes, download=self.download)
+        return Mesh(**ply.parse(data), job=job, notes=notes, download=self.download)
 
 _UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form")
 

@@ -36,6 +36,9 @@ class Exchange:
         """The response's object. Raises WrongAnswer if it lacks one of the `members`."""
         return _parsed(self._transport.repeat(Request("GET", target, patience=patience)), members)
 
+    def text(self, target: str) -> bytes:
+        return self._transport.repeat(Request("GET", target))
+
     def pages(self, path: str, member: str, items: Members, query: Dict[str, str]) -> Iterator[Any]:
         """The items of all pages of a list."""
         while True:

@@ -6,7 +6,7 @@ import hashlib
 import importlib
 from array import array
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, Optional, Sequence, Union
 
 from . import files, ply
 
@@ -23,7 +23,9 @@ class Mesh:
 
     vertices  float32, shape (n, 3)
     faces     uint32, shape (m, 3): indices of vertices, counter-clockwise seen from outside
-    labels    int32, uint32 or int64, shape (m,): the label of each face; None unless the job had labels
+    labels    int32, uint32 or int64, shape (m,): the label of each face; None unless the job had labels. Each
+              label has vertices of its own; where two labels touch, theirs are at the same places
+    colors    uint8, shape (n, 3): red, green and blue (sRGB) of each vertex's label; None without labels
     normals   float32, shape (n, 3): the unit normal of each vertex
     bounds    float32, shape (2, 3): the smallest and the largest corner
     space     "lps" (DICOM's patient space), or "ras" (NIfTI's and nibabel's); see `in_space`
@@ -40,6 +42,7 @@ class Mesh:
     vertices: Any
     faces: Any
     labels: Any
+    colors: Any
     notes: Sequence[api.Note]
 
     def __init__(
@@ -51,10 +54,12 @@ class Mesh:
         job: Optional[api.SucceededJob] = None,
         notes: Sequence[api.Note] = (),
         download: Optional[Download] = None,
+        colors: Optional[Any] = None,
     ) -> None:
         self.vertices = vertices
         self.faces = faces
         self.labels = labels
+        self.colors = colors
         self.notes = notes
         self._space = _checked(space)
         self._job = job
@@ -87,8 +92,7 @@ class Mesh:
         """The unit normal of each vertex, outward: the mean of its faces, weighted by their areas.
 
         The normals are computed from `vertices` and `faces` on every access. A normal is zero if the
-        vertex has no faces, or if its faces cancel out, as on the wall between two labels. For one
-        label's normals use that label's faces alone: `Mesh(mesh.vertices, mesh.faces[mesh.labels == 1])`.
+        vertex has no faces, or if its faces cancel out.
         """
         numpy = _package("numpy", "mesh.normals", "numpy")
         points = numpy.asarray(self.vertices)
@@ -106,9 +110,9 @@ class Mesh:
     def in_space(self, space: str) -> Mesh:
         """A copy of the mesh in "ras" or "lps". x and y change their signs between the two."""
         turned = _turned if _checked(space) != self.space else _copied
-        labels = None if self.labels is None else _copied(self.labels)
+        labels, colors = (None if each is None else _copied(each) for each in (self.labels, self.colors))
         return Mesh(
-            turned(self.vertices), _copied(self.faces), labels, space, self._job, self.notes, self._download
+            turned(self.vertices), _copied(self.faces), labels, space, self._job, self.notes, self._download, colors
         )
 
     def save(self, path: Union[str, os.PathLike[str]]) -> Path:
@@ -116,13 +120,14 @@ class Mesh:
 
         `.ply` is written from the arrays. Every other format is a file of the job and is downloaded:
         `client.mesh("head.nii.gz", iso=60, formats=["glb", "stl"])` makes the files for `.glb` and
-        `.stl`. Raises ValueError if the job has no file of the format, or if the mesh is not the one
-        that the server made: its arrays were changed, or `in_space` has turned it.
+        `.stl`. An `.obj` of labels gets its materials beside it, as `client.download` says. Raises
+        ValueError if the job has no file of the format, or if the mesh is not the one that the server
+        made: its arrays were changed, or `in_space` has turned it.
         """
         target = Path(path)
         form = files.format_of(target)
         if form == "ply":
-            data = ply.pieces(self.vertices, self.faces, self.labels, self.space)
+            data = self._in_ply()
             first = next(data)  # raises for arrays that cannot be written, before there is a file
             with files.written(target) as file:
                 file.write(first)
@@ -146,6 +151,7 @@ class Mesh:
         return trimesh.Trimesh(
             vertices=numpy.array(self.vertices, "float64"),
             faces=numpy.array(self.faces, "int64"),
+            vertex_colors=None if self.colors is None else numpy.array(self.colors),
             face_attributes=labels,
             metadata={"units": "angstrom" if is_angstrom else "mm", "space": self.space},
             process=False,  # which would merge and reorder vertices
@@ -182,6 +188,9 @@ class Mesh:
         # A connection and its token belong to this process; copies of the mesh do without.
         return {**self.__dict__, "_download": None}
 
+    def _in_ply(self) -> Iterator[bytes]:
+        return ply.pieces(self.vertices, self.faces, self.labels, self.colors, self.space)
+
     def _expect_unchanged(self, form: str) -> None:
         """Raises ValueError unless the arrays are those that the server sent."""
         made_in = self.job["parameters"].get("space", "lps")
@@ -191,7 +200,7 @@ class Mesh:
                 f"add space={self.space!r} to the call that starts the job, or save the mesh as .ply"
             )
         digest = hashlib.sha256()
-        for piece in ply.pieces(self.vertices, self.faces, self.labels, self.space):
+        for piece in self._in_ply():
             digest.update(piece)
         if digest.hexdigest() != files.file_of(self.job, "ply")["sha256"]:
             raise ValueError(
@@ -203,7 +212,7 @@ class Mesh:
 def read_ply(source: Union[bytes, bytearray, memoryview, str, os.PathLike[str]]) -> Mesh:
     """The mesh of a PLY file that isomesh wrote. Raises WrongAnswer for any other file."""
     data = source if isinstance(source, (bytes, bytearray, memoryview)) else Path(source).read_bytes()
-    return Mesh(*ply.parse(data))
+    return Mesh(**ply.parse(data))
 
 
 def why_empty(job: api.SucceededJob, volume: api.Volume) -> str:

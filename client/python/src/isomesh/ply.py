@@ -1,65 +1,95 @@
-"""isomesh's PLY files: binary, little-endian, with float coordinates and three corners per face."""
+"""isomesh's PLY files: binary, little-endian, with float coordinates and three corners per face.
+
+A label is a property of vertices, because each label has vertices of its own. Arrays whose labels share vertices have it
+as a property of faces."""
 
 from __future__ import annotations
 
 import sys
 from array import array
-from typing import Any, Dict, Iterator, List, Optional, Tuple, Union
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
 
 from .errors import WrongAnswer
 
 _HEADER_END = b"end_header\n"
 _LONGEST_HEADER = 1 << 22  # with a comment for each of 65535 labels
 _COMMENT = "comment isomesh, millimetres, "
+_POSITION = "".join(f"property float {axis}\n" for axis in "xyz")
+_COLOR = "".join(f"property uchar {channel}\n" for channel in ("red", "green", "blue"))
+_CORNERS = "property list uchar uint vertex_indices\n"
+_LABEL = {"i": "property int label\n", "I": "property uint label\n"}
 
 
-def parse(source: Union[bytes, bytearray, memoryview]) -> Tuple[Any, Any, Any, str]:
-    """Vertices, faces, labels or None, and the space. Raises WrongAnswer for a file of another form."""
+class _Header(NamedTuple):
+    vertices: int
+    faces: int
+    begin: int  # of the vertices
+    space: str
+    has_colors: bool
+    label_of: str  # the element that has labels: "vertex", "face" or "" for none
+    label_kind: str
+    long_labels: List[int]  # by number, from 1
+
+
+def parse(source: Union[bytes, bytearray, memoryview]) -> Dict[str, Any]:
+    """The members of a Mesh: vertices, faces, labels, colors (both may be None) and space. Raises WrongAnswer for a file
+    of another form."""
     data = memoryview(source).cast("B")
-    elements, long_labels = _header_of(bytes(data[:_LONGEST_HEADER]))
-    label = elements.get("label", "")
-    vertices, faces = int(elements["vertex"]), int(elements["face"])
-    begin = int(elements["begin"])
-    vertex_bytes, face_bytes = 12 * vertices, (17 if label else 13) * faces
-    if len(data) != begin + vertex_bytes + face_bytes:
+    header = _header_of(bytes(data[:_LONGEST_HEADER]))
+    points, triangles, kind = header.vertices, header.faces, header.label_kind
+    vertex_size = 12 + (3 if header.has_colors else 0) + (4 if header.label_of == "vertex" else 0)
+    face_size = 17 if header.label_of == "face" else 13
+    end = header.begin + vertex_size * points
+    if len(data) != end + face_size * triangles:
         raise WrongAnswer("the size of the PLY file does not match its header")
-    records = data[begin + vertex_bytes :]
-    if bytes(records[:: 17 if label else 13]).strip(b"\x03"):
+    vertices, faces = data[header.begin : end], data[end:]
+    if bytes(faces[::face_size]).strip(b"\x03"):
         raise WrongAnswer("the PLY file has a face that is not a triangle")
-    labels = shaped(_columns(records, faces, 13, 4), "i" if label == "int" else "I", faces) if label else None
-    return (
-        shaped(data[begin : begin + vertex_bytes], "f", vertices, 3),
-        shaped(_columns(records, faces, 1, 12), "I", faces, 3),
-        _long(labels, long_labels) if long_labels else labels,
-        elements["space"],
-    )
+    corners = shaped(_columns(faces, triangles, 1, 12), "I", triangles, 3)
+    labels = None
+    if header.label_of == "face":
+        labels = shaped(_columns(faces, triangles, 13, 4), kind, triangles)
+    elif header.label_of == "vertex":
+        labels = _of_faces(shaped(_columns(vertices, points, vertex_size - 4, 4), kind, points), corners, kind)
+    return {
+        "vertices": shaped(_columns(vertices, points, 0, 12), "f", points, 3),
+        "faces": corners,
+        "labels": _long(labels, header.long_labels) if header.long_labels else labels,
+        "colors": shaped(_columns(vertices, points, 12, 3), "B", points, 3) if header.has_colors else None,
+        "space": header.space,
+    }
 
 
-def pieces(vertices: Any, faces: Any, labels: Any, space: str) -> Iterator[bytes]:
+def pieces(vertices: Any, faces: Any, labels: Any, colors: Any, space: str) -> Iterator[bytes]:
     """The bytes of the file, as the server writes them. Raises ValueError for arrays of other shapes
     and for faces of vertices that do not exist."""
-    points = _bytes_of("vertices", vertices, "f", 3)
+    of_vertex, vertex = [(_bytes_of("vertices", vertices, "f", 3), 12)], _POSITION
     corners = _bytes_of("faces", faces, "I", 3, below=len(vertices))
+    of_face, face = [(b"\x03" * len(faces), 1), (corners, 12)], _CORNERS
+    if colors is not None:
+        if len(colors) != len(vertices):
+            raise ValueError(f"there are {len(colors)} colors for {len(vertices)} vertices; set colors to None to save none")
+        of_vertex.append((_bytes_of("colors", colors, "B", 3), 3))
+        vertex += _COLOR
     labels, long_labels = _numbered(labels)
-    kind = _kind_of(labels)
-    values = b"" if labels is None else _bytes_of("labels", labels, kind)
-    if labels is not None and len(labels) != len(faces):
-        raise ValueError(f"there are {len(labels)} labels for {len(faces)} faces")
-    of_label = "" if labels is None else f"property {'uint' if kind == 'I' else 'int'} label\n"
+    if labels is not None:
+        kind = _kind_of(labels)
+        values = _bytes_of("labels", labels, kind)
+        if len(labels) != len(faces):
+            raise ValueError(f"there are {len(labels)} labels for {len(faces)} faces")
+        labels_of_vertices = _of_vertices(values, corners, len(vertices))
+        if labels_of_vertices is None:
+            of_face.append((values, 4))
+            face += _LABEL[kind]
+        else:
+            of_vertex.append((labels_of_vertices, 4))
+            vertex += _LABEL[kind]
     yield (
         f"ply\nformat binary_little_endian 1.0\n{_COMMENT}{space.upper()}\n{long_labels}element vertex {len(vertices)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {len(faces)}\nproperty list uchar uint vertex_indices\n{of_label}end_header\n"
+        f"{vertex}element face {len(faces)}\n{face}end_header\n"
     ).encode()
-    yield points
-    size = 13 if labels is None else 17
-    records = bytearray(size * len(faces))
-    records[::size] = b"\x03" * len(faces)
-    for byte in range(12):
-        records[1 + byte :: size] = corners[byte::12]
-    for byte in range(size - 13):
-        records[13 + byte :: size] = values[byte::4]
-    yield bytes(records)
+    yield _records(of_vertex, len(vertices))
+    yield _records(of_face, len(faces))
 
 
 def shaped(data: Any, kind: str, *shape: int) -> Any:
@@ -77,6 +107,43 @@ def shaped(data: Any, kind: str, *shape: int) -> Any:
     if 0 in shape:  # a memoryview cannot have this shape
         return view[:0].cast(kind)
     return view.cast(kind, shape)
+
+
+def _of_faces(labels: Any, corners: Any, kind: str) -> Any:
+    """The label of each face: that of its first corner."""
+    try:
+        if isinstance(labels, memoryview):
+            found = array(kind, (labels[vertex] for vertex in array("I", corners.tobytes())[::3]))
+            return memoryview(found).toreadonly()
+        return labels[corners[:, 0]]
+    except IndexError as error:
+        raise WrongAnswer("the PLY file has a face of a vertex that does not exist") from error
+
+
+def _of_vertices(labels: bytes, corners: bytes, count: int) -> Optional[bytes]:
+    """The label of each vertex: that of its faces, or 0 without faces. None if a vertex has faces of two labels. All of
+    them are numbers of 32 bits."""
+    try:
+        import numpy
+    except ImportError:
+        pass
+    else:
+        vertices = numpy.frombuffer(corners, "<u4")
+        wanted = numpy.repeat(numpy.frombuffer(labels, "<u4"), 3)
+        found = numpy.zeros(count, "<u4")
+        found[vertices] = wanted
+        return found.tobytes() if numpy.array_equal(found[vertices], wanted) else None
+    numbers = array("I", labels)
+    columns = [array("I", corners)[corner::3] for corner in range(3)]
+    if sys.byteorder != "little":
+        for column in columns:
+            column.byteswap()
+    each = array("I", bytes(4 * count))
+    for column in columns:
+        for vertex, label in zip(column, numbers):
+            each[vertex] = label
+    is_one = all(each[vertex] == label for column in columns for vertex, label in zip(column, numbers))
+    return each.tobytes() if is_one else None
 
 
 def _long(numbers: Any, labels: List[int]) -> Any:
@@ -102,27 +169,55 @@ def _numbered(labels: Any) -> Tuple[Any, str]:
     return memoryview(array("I", (number[int(label)] for label in labels))), comments
 
 
-def _header_of(text: bytes) -> Tuple[Dict[str, str], List[int]]:
-    """The counts of elements, the space, where the data begins, and the type of the labels; and the labels that
-    faces have by number."""
+def _header_of(text: bytes) -> _Header:
     end = text.find(_HEADER_END)
     lines = text[: max(end, 0)].decode("ascii", "replace").splitlines()
     if lines[:2] != ["ply", "format binary_little_endian 1.0"]:
         raise WrongAnswer("the file is not a binary, little-endian PLY file")
-    properties = [line for line in lines if line.startswith("property ")]
-    known = [f"property float {axis}" for axis in "xyz"] + ["property list uchar uint vertex_indices"]
-    labels = [line.split()[1] for line in properties[4:] if line.split()[2:] == ["label"]]
-    counts = dict(line.split()[1:3] for line in lines if line.startswith("element "))
-    if properties[:4] != known or len(properties) != 4 + len(labels) or list(counts) != ["vertex", "face"]:
+    counts: Dict[str, str] = {}
+    properties: Dict[str, str] = {}
+    for line in lines:
+        if line.startswith("element "):
+            _, element, counts[element] = (line.split() + ["", ""])[:3]
+            properties[element] = ""
+        elif line.startswith("property ") and properties:
+            properties[list(properties)[-1]] += line + "\n"
+    vertex, face = properties.get("vertex", ""), properties.get("face", "")
+    has_colors = vertex.startswith(_POSITION + _COLOR)
+    # What is left are labels.
+    rest = {"vertex": vertex[len(_POSITION) + (len(_COLOR) if has_colors else 0) :], "face": face[len(_CORNERS) :]}
+    labels = [(element, kind) for element in rest for kind, name in _LABEL.items() if rest[element] == name]
+    is_ours = vertex.startswith(_POSITION) and face.startswith(_CORNERS) and list(counts) == ["vertex", "face"]
+    if not is_ours or len(labels) > 1 or sum(map(bool, rest.values())) != len(labels):
         raise WrongAnswer("isomesh did not write this PLY file")
-    space = "ras" if f"{_COMMENT}RAS" in lines else "lps"
-    found = {**counts, "space": space, "begin": str(end + len(_HEADER_END))}
     told = [line.split() for line in lines if line.startswith("comment label ")]
     try:
         long_labels = [int(words[4]) for words in told]
     except (ValueError, IndexError) as error:
         raise WrongAnswer("the PLY file has a comment on a label that says none") from error
-    return {**found, "label": labels[0]} if labels else found, long_labels
+    return _Header(
+        vertices=int(counts["vertex"]),
+        faces=int(counts["face"]),
+        begin=end + len(_HEADER_END),
+        space="ras" if f"{_COMMENT}RAS" in lines else "lps",
+        has_colors=has_colors,
+        label_of=labels[0][0] if labels else "",
+        label_kind=labels[0][1] if labels else "",
+        long_labels=long_labels,
+    )
+
+
+def _records(columns: List[Tuple[bytes, int]], count: int) -> bytes:
+    """The inverse of `_columns`: records of the bytes of several columns, each with its width."""
+    if len(columns) == 1:
+        return columns[0][0]
+    size = sum(width for _, width in columns)
+    out, begin = bytearray(size * count), 0
+    for data, width in columns:
+        for byte in range(width):
+            out[begin + byte :: size] = data[byte::width]
+        begin += width
+    return bytes(out)
 
 
 def _columns(records: memoryview, count: int, begin: int, width: int) -> memoryview:

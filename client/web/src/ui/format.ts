@@ -1,5 +1,5 @@
 // Numbers and times for people.
-import { meshFormatTitles, volumeFormats } from '../../generated/parameters';
+import { meshFileSuffixes, meshFormatTitles, volumeFormats } from '../../generated/parameters';
 
 const plain = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
@@ -96,6 +96,11 @@ export function shortId(id: string): string {
 
 export function meshFormatTitle(name: string): string {
   return meshFormatTitles[name] ?? name;
+}
+
+// The end of a mesh file's name, without the dot.
+export function meshFileSuffix(name: string): string {
+  return meshFileSuffixes[name] ?? name;
 }
 
 export function volumeFormatTitle(name: string): string {

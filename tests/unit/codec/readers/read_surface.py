@@ -52,10 +52,11 @@ def by_nibabel(path):
         nothing = numpy.zeros((0, 3), numpy.float32)
         return nothing, nothing, numpy.zeros(0, numpy.int64), dict(image.meta)
     points, triangles = image.agg_data(('pointset', 'triangle'))
-    system = image.get_arrays_from_intent('pointset')[0].coordsys
+    pointset = image.get_arrays_from_intent('pointset')[0]
+    system = pointset.coordsys
     if not numpy.array_equal(system.xform, numpy.eye(4)):
         sys.exit('there is a transformation')
-    told = {'dataspace': nibabel.nifti1.xform_codes.niistring[system.dataspace], **image.meta}
+    told = {'dataspace': nibabel.nifti1.xform_codes.niistring[system.dataspace], **image.meta, **pointset.metadata}
     return points, triangles, numpy.zeros(0, numpy.int64), told
 
 

@@ -7,7 +7,7 @@ import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets'
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, definitions, h, type Child } from '../../ui/dom';
-import { formatBytes, formatCount, formatNumber, formatSize, formatValue, meshFormatTitle } from '../../ui/format';
+import { formatBytes, formatCount, formatNumber, formatSize, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
@@ -123,7 +123,7 @@ export function timings(job: Job, more: Durations = {}): HTMLElement {
 
 export function downloads(job: Job, volume: Volume | null): HTMLElement {
   const files = job.mesh?.files ?? {};
-  const name = (format: string): string => fileNameOf(job, volume, `.${format}`);
+  const name = (format: string): string => fileNameOf(job, volume, `.${meshFileSuffix(format)}`);
   const missing = meshFormats.filter((format) => !job.parameters.formats.includes(format));
   const make = async (format: MeshFormat): Promise<void> => {
     try {
@@ -149,6 +149,12 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
             ]
           : [];
       }),
+      files['obj'] && isByLabels(job.parameters) &&
+        button(
+          'Colours of the OBJ',
+          () => void saveFile(`/v1/jobs/${job.id}/mesh.mtl`, 'mesh.mtl', 0).catch(tellError),
+          { 'data-format': 'mtl', title: 'Save it as mesh.mtl beside the OBJ, which names it so' },
+        ),
     ]),
     missing.length > 0 &&
       h('div.make', [

@@ -3,15 +3,16 @@ import type { Job, LabelSummary, Volume, Label } from '../../api/types';
 import { labelTitle, type LabelState } from '../../job/labels';
 import { fileNameOf } from '../../job/variants';
 import { button, checkbox, h } from '../../ui/dom';
-import { formatBytes, formatCount, formatValue, meshFormatTitle } from '../../ui/format';
+import { formatBytes, formatCount, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { saveFile } from '../../ui/save';
 import type { Scope } from '../../ui/signal';
 import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
 
-export function volumeText({ volume_mm3: volume }: LabelSummary): string {
-  return `${formatValue(volume)} mm\u00b3`;
+// An open label encloses nothing: the sum over its triangles is no volume.
+export function volumeText({ closed, oriented, volume_mm3: volume }: LabelSummary): string {
+  return closed && oriented ? `${formatValue(volume)} mm\u00b3` : 'none (open)';
 }
 
 export function areaText({ area_mm2: area }: LabelSummary): string {
@@ -84,7 +85,7 @@ export class LabelList {
         colour,
         h('div.label-text', [
           check,
-          h('span.faint', `${formatCount(label.triangles)} triangles, ${volumeText(label)}`),
+          h('span.faint', `${formatCount(label.triangles)} triangles, volume ${volumeText(label)}`),
         ]),
         alone,
         ...this.downloads(label, title),
@@ -102,7 +103,7 @@ export class LabelList {
     return Object.entries(label.files ?? {}).map(([format, { bytes, href }]) =>
       button(
         meshFormatTitle(format),
-        () => void saveFile(href, fileNameOf(this.job, this.volume, `-${label.label}.${format}`), bytes).catch(tellError),
+        () => void saveFile(href, fileNameOf(this.job, this.volume, `-${label.label}.${meshFileSuffix(format)}`), bytes).catch(tellError),
         { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${meshFormatTitle(format)}` },
       ),
     );
