@@ -139,14 +139,16 @@ Encoder encode_glb;
 // the Open Packaging Conventions of ECMA-376.
 //
 // One object in millimetres (angstrom are written as such: 3MF has none); numbers as the shortest
-// text that reads as the same float. Its type is "model", for printing, if the surface is closed,
-// manifold and oriented, as the type requires; otherwise "surface". An empty surface is a file
-// without an object. The metadata has the members of asset.extras of GLB. Deflated by one thread.
-// Always returns the topology of one surface.
+// text that reads as the same float. Its type is "model" whether it is closed or open, because
+// slicers reject files with another. Its name is the iso-value. An empty surface is a file without
+// an object. The metadata has the members of asset.extras of GLB and no date: equal jobs give equal
+// bytes. Deflated by one thread.
 //
 // A label that has triangles is an object with its title as the name, its value as the part number,
-// and its colour. Objects have their own vertices, at the same positions as adjacent labels. Holds
-// one label's surface in memory. Throws Error kInternal if the ZIP library fails.
+// and its colour ("3MF Materials and Properties Extension", chapter 2). Several are the components
+// of one object, all where they are in the volume. Objects have their own vertices, at the same
+// positions as adjacent labels. Holds one label's surface in memory. Throws Error kInternal if the
+// ZIP library fails.
 Encoder encode_3mf;
 
 // The text form of Universal Scene Description, USD ("Pixar Animation Studios, Universal Scene

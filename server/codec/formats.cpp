@@ -168,7 +168,6 @@ constexpr std::array kFormats = {
                  return 2000 + 18 * as_double(surface.vertices) + 7 * as_double(surface.triangles);
                },
            .memory_bytes = label_memory,
-           .shows_topology = [](const MeshParameters&) { return true; },
            .encode = encode_3mf},
     Format{.format = MeshFormat::kUsda,
            .media_type = "model/vnd.usda",

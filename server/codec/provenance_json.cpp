@@ -33,6 +33,8 @@ std::string provenance_text(const Provenance& provenance) {
   return dump(provenance_json(provenance));
 }
 
+std::string application() { return "isomesh " ISOMESH_VERSION; }
+
 std::string provenance_for_xml(const Provenance& provenance) {
   std::string result;
   for (const char c : provenance_text(provenance)) {

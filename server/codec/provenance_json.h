@@ -13,6 +13,9 @@ nlohmann::ordered_json provenance_json(const Provenance& provenance);
 
 std::string provenance_text(const Provenance& provenance);
 
+// The program that makes the files, with its version: "isomesh 1.2.3".
+std::string application();
+
 // As text without characters that XML escapes: some readers do not unescape.
 std::string provenance_for_xml(const Provenance& provenance);
 

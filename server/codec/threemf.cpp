@@ -1,9 +1,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "base/text.h"
 #include "base/xml.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
@@ -33,6 +36,13 @@ constexpr std::string_view kRelationships =
     "Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/>"
     "</Relationships>\n";
 
+// Bambu Studio and OrcaSlicer find colours by the prefix m, not by its namespace.
+constexpr std::string_view kModel =
+    "<model unit=\"millimeter\" xml:lang=\"en-US\" "
+    "xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\" "
+    "xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\" "
+    "xmlns:isomesh=\"urn:isomesh:mesh\">\n";
+
 constexpr std::string_view kVertex = "<vertex x=\"";
 constexpr std::string_view kTriangle = "<triangle v1=\"";
 constexpr std::size_t kMostVertexBytes = 40 + 3 * kMostFloatBytes;
@@ -54,6 +64,7 @@ std::byte* write_triangle(const mesh::Triangle& triangle, std::byte* begin) {
   return reinterpret_cast<std::byte*>(write_text("\"/>\n", out));
 }
 
+// With the opacity, because assimp 5.4 shows colours without one as transparent.
 std::string hex_color(const std::array<double, 3>& color) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string text = "#";
@@ -62,14 +73,35 @@ std::string hex_color(const std::array<double, 3>& color) {
     text += kDigits[byte / 16];
     text += kDigits[byte % 16];
   }
+  return text + "FF";
+}
+
+std::string in_quotes_of_xml(std::string_view text) { return '"' + xml_escaped(text) + '"'; }
+
+std::string in_quotes_of_xml(std::uint64_t number) { return '"' + std::to_string(number) + '"'; }
+
+// On the coordinates, and on their error if it has a limit.
+std::string about_coordinates(const FileContent& content) {
+  std::string text = " Coordinates in " + std::string(letters_of(content.space)) + ", in " +
+                     std::string(content.unit.name);
+  if (content.unit != length_unit({})) text += ", written as millimetres";
+  text += '.';
+  if (const auto limit = content.provenance.parameters.max_error_mm) {
+    text += " At most " + to_text(*limit) + ' ' + std::string(content.unit.symbol) +
+            " from the extracted surface.";
+  }
   return text;
 }
 
+struct Heading {
+  std::string title;
+  std::string description;
+};
+
 struct Object {
   std::string name;
-  std::string part_number;
-  std::size_t material = 0;
-  bool is_solid = false;
+  std::string part_number = {};
+  std::optional<std::array<double, 3>> color = {};
 };
 
 class Package {
@@ -79,39 +111,34 @@ class Package {
     std::uint64_t vertices = 0;
   };
 
-  Package(const Sink& sink, const Size& most, Space space)
-      : zip_(sink, kDeflated, sizes_of(most)), space_(space) {
+  Package(const Sink& sink, const Size& most, const FileContent& content, const Heading& heading)
+      : zip_(sink, kDeflated, sizes_of(most)), space_(content.space), title_(heading.title) {
     add("[Content_Types].xml", kContentTypes);
     add("_rels/.rels", kRelationships);
     zip_.begin(kModelName);
-  }
-
-  void begin_model(const std::string& title, const Provenance& provenance) {
     write(kXml);
-    write(
-        "<model unit=\"millimeter\" xml:lang=\"en-US\" "
-        "xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\" "
-        "xmlns:isomesh=\"urn:isomesh:mesh\">\n");
-    write("<metadata name=\"Title\">" + xml_escaped(title) + "</metadata>\n");
-    write("<metadata name=\"Application\">isomesh</metadata>\n");
-    write("<metadata name=\"isomesh:provenance\">" + provenance_for_xml(provenance) +
-          "</metadata>\n<resources>\n");
+    write(kModel);
+    write_metadata("Title", xml_escaped(title_));
+    write_metadata("Description", xml_escaped(heading.description));
+    write_metadata("Application", application());
+    write_metadata("isomesh:provenance", provenance_for_xml(content.provenance));
+    write("<resources>\n");
   }
-
-  void begin_materials() { write("<basematerials id=\"" + std::to_string(kMaterialsId) + "\">\n"); }
-  void add_material(const std::string& name, const std::array<double, 3>& color) {
-    write("<base name=\"" + xml_escaped(name) + "\" displaycolor=\"" + hex_color(color) + "\"/>\n");
-  }
-  void end_materials() { write("</basematerials>\n"); }
 
   void add_object(const Object& object, const mesh::Mesh& mesh, const mesh::Context& context) {
-    const std::string id = std::to_string(kMaterialsId + 1 + objects_);
-    ++objects_;
-    write("<object id=\"" + id + "\" type=\"" + (object.is_solid ? "model" : "surface") +
-          "\" name=\"" + xml_escaped(object.name) + '"' +
-          (object.part_number.empty() ? "" : " partnumber=\"" + object.part_number + '"') +
-          " pid=\"" + std::to_string(kMaterialsId) + "\" pindex=\"" +
-          std::to_string(object.material) + "\">\n<mesh>\n<vertices>\n");
+    std::string attributes = " name=" + in_quotes_of_xml(object.name);
+    if (!object.part_number.empty()) {
+      attributes += " partnumber=" + in_quotes_of_xml(object.part_number);
+    }
+    // OrcaSlicer reads one colour of each group only.
+    if (object.color) {
+      write("<m:colorgroup id=" + in_quotes_of_xml(++last_id_) + "><m:color color=" +
+            in_quotes_of_xml(hex_color(*object.color)) + "/></m:colorgroup>\n");
+      attributes += " pid=" + in_quotes_of_xml(last_id_) + " pindex=\"0\"";
+    }
+    begin_object(attributes);
+    objects_.push_back(last_id_);
+    write("<mesh>\n<vertices>\n");
     BlockWriter writer(context, bytes_, mesh.positions.size() + mesh.triangles.size());
     writer.write(mesh.positions.size(), kMostVertexBytes, [&](std::size_t v, std::byte* out) {
       return write_vertex(in_space(mesh.positions[v], space_), out);
@@ -123,18 +150,25 @@ class Package {
     write("</triangles>\n</mesh>\n</object>\n");
   }
 
+  // Several objects become components of one, which alone is built. Slicers arrange the items of a
+  // build one by one.
   void finish() {
-    write("</resources>\n<build>\n");
-    for (std::size_t n = 1; n <= objects_; ++n) {
-      write("<item objectid=\"" + std::to_string(kMaterialsId + n) + "\"/>\n");
+    if (objects_.size() > 1) {
+      begin_object(" name=" + in_quotes_of_xml(title_));
+      write("<components>\n");
+      for (const std::uint64_t id : objects_) {
+        write("<component objectid=" + in_quotes_of_xml(id) + "/>\n");
+      }
+      write("</components>\n</object>\n");
     }
+    write("</resources>\n<build>\n");
+    if (!objects_.empty()) write("<item objectid=" + in_quotes_of_xml(last_id_) + "/>\n");
     write("</build>\n</model>\n");
     zip_.finish();
   }
 
  private:
   static constexpr auto kDeflated = ZipWriter::Compression::kDeflated;
-  static constexpr std::size_t kMaterialsId = 1;
 
   // Some readers do not support ZIP64, so it is used only if the package may be large.
   static ZipWriter::Sizes sizes_of(const Size& most) {
@@ -151,16 +185,31 @@ class Package {
     write(kXml);
     write(content);
   }
+  void write_metadata(const std::string& name, const std::string& content) {
+    write("<metadata name=\"" + name + "\">" + content + "</metadata>\n");
+  }
+  void begin_object(const std::string& attributes) {
+    write("<object id=" + in_quotes_of_xml(++last_id_) + " type=\"model\"" + attributes + ">\n");
+  }
   void write(std::string_view text) { put_text(bytes_, text); }
 
   ZipWriter zip_;
   const Space space_;
+  const std::string title_;
   const Sink bytes_ = [this](std::span<const std::byte> piece) { zip_.write(piece); };
-  std::size_t objects_ = 0;
+  std::vector<std::uint64_t> objects_;  // with a mesh
+  std::uint64_t last_id_ = 0;           // of the resources
 };
 
-bool is_solid(const mesh::Topology& topology) {
-  return topology.boundary_edges == 0 && topology.manifold && topology.oriented;
+// One label's title, or how many there are.
+std::string title_of_all(std::span<const LabelSummary> labels,
+                         const mesh::LabelTriangles& triangles) {
+  std::vector<std::size_t> found;
+  for (std::size_t n = 1; n <= labels.size(); ++n) {
+    if (!triangles.of(n).empty()) found.push_back(n);
+  }
+  return found.size() == 1 ? title_of(labels[found[0] - 1])
+                           : std::to_string(found.size()) + " labels";
 }
 
 void encode_labels(const LabelledSurface& surface, const FileContent& content,
@@ -169,15 +218,9 @@ void encode_labels(const LabelledSurface& surface, const FileContent& content,
   const std::size_t labels = surface.labels.size();
   // Every wall belongs to one or two labels.
   const std::uint64_t walls = surface.walls.mesh.triangles.size();
-  Package package(sink, {2 * walls, 2 * 3 * walls}, content.space);
-  package.begin_model("labels", content.provenance);
-  if (labels > 0) {
-    package.begin_materials();
-    for (const LabelSummary& label : surface.labels) {
-      package.add_material(title_of(label), color_of(label));
-    }
-    package.end_materials();
-  }
+  const std::string title = title_of_all(surface.labels, surface.triangles);
+  Package package(sink, {2 * walls, 2 * 3 * walls}, content,
+                  {title, "The surface of " + title + '.' + about_coordinates(content)});
   mesh::Mesh mesh;
   for (std::size_t n = 1; n <= labels; ++n) {
     const LabelSummary& label = surface.labels[n - 1];
@@ -185,8 +228,7 @@ void encode_labels(const LabelledSurface& surface, const FileContent& content,
       extract_label(surface.walls, surface.triangles, n, mesh);
       package.add_object({.name = title_of(label),
                           .part_number = std::to_string(label.label),
-                          .material = n - 1,
-                          .is_solid = label.closed && label.manifold && label.oriented},
+                          .color = color_of(label)},
                          mesh, quiet);
     }
     if (context.progress) context.progress(static_cast<double>(n) / static_cast<double>(labels));
@@ -203,19 +245,13 @@ std::optional<mesh::Topology> encode_3mf(const FileContent& content, const mesh:
     return std::nullopt;
   }
   const mesh::Mesh& mesh = content.mesh;
-  const mesh::Topology topology = measure_topology(mesh, {context.stop, nullptr});
-  Package package(sink, {mesh.triangles.size(), mesh.positions.size()}, content.space);
-  package.begin_model("surface", content.provenance);
-  if (mesh.triangles.size() > 0) {
-    constexpr std::array<double, 3> kNeutral = {0.9, 0.9, 0.9};
-    package.begin_materials();
-    package.add_material("neutral", kNeutral);
-    package.end_materials();
-    package.add_object({.name = "surface", .part_number = {}, .is_solid = is_solid(topology)}, mesh,
-                       context);
-  }
+  const std::string iso = to_text(content.provenance.iso);
+  const Heading heading = {"iso " + iso,
+                           "The surface at the value " + iso + '.' + about_coordinates(content)};
+  Package package(sink, {mesh.triangles.size(), mesh.positions.size()}, content, heading);
+  if (mesh.triangles.size() > 0) package.add_object({.name = heading.title}, mesh, context);
   package.finish();
-  return topology;
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

@@ -41,30 +41,27 @@ std::string text_of(const char* what, Call call, Arguments... arguments) {
   return text;
 }
 
-std::array<std::uint8_t, 3> color_of(Handle* model, Handle* object) {
+std::optional<std::array<std::uint8_t, 3>> color_of(Handle* object) {
   const Held handler =
       object_of("a property", NMR::lib3mf_object_createdefaultpropertyhandler, object);
-  DWORD group = 0;
-  DWORD index = 0;
-  check(NMR::lib3mf_defaultpropertyhandler_getbasematerial(in(handler), &group, &index),
-        "a material");
-  const Held material = object_of("a material", NMR::lib3mf_model_getresourcebyid, model, group);
-  std::array<std::uint8_t, 3> color = {};
-  BYTE alpha = 0;
-  check(NMR::lib3mf_basematerial_getdisplaycolor(in(material), index, &color[0], &color[1],
-                                                 &color[2], &alpha),
-        "a colour");
-  return color;
+  NMR::eModelPropertyType type = NMR::MODELPROPERTYTYPE_NONE;
+  check(NMR::lib3mf_defaultpropertyhandler_getpropertytype(in(handler), &type), "its type");
+  if (type == NMR::MODELPROPERTYTYPE_NONE) return std::nullopt;
+  if (type != NMR::MODELPROPERTYTYPE_COLOR) throw std::runtime_error("a property is no colour");
+  NMR::MODELMESHCOLOR_SRGB color = {};
+  check(NMR::lib3mf_defaultpropertyhandler_getcolor(in(handler), 0, &color), "a colour");
+  if (color.m_Alpha != 0xff) throw std::runtime_error("a colour is transparent");
+  return std::array<std::uint8_t, 3>{color.m_Red, color.m_Green, color.m_Blue};
 }
 
-Object3mf read_object(Handle* model, Handle* object) {
+Object3mf read_object(Handle* object) {
   Object3mf result;
   result.name = text_of("a name", NMR::lib3mf_object_getnameutf8, object);
   result.part_number = text_of("a part number", NMR::lib3mf_object_getpartnumberutf8, object);
   DWORD type = 0;
   check(NMR::lib3mf_object_gettype(object, &type), "a type");
   result.is_model = type == NMR::MODELOBJECTTYPE_MODEL;
-  result.color = color_of(model, object);
+  result.color = color_of(object);
   DWORD points = 0;
   DWORD triangles = 0;
   check(NMR::lib3mf_meshobject_getvertexcount(object, &points), "vertices");
@@ -81,6 +78,31 @@ Object3mf read_object(Handle* model, Handle* object) {
         {triangle.m_nIndices[0], triangle.m_nIndices[1], triangle.m_nIndices[2]});
   }
   return result;
+}
+
+void refuse_if(bool is_moved) {
+  if (is_moved) throw std::runtime_error("an object is moved");
+}
+
+void read_objects(Handle* object, Model3mf& model) {
+  BOOL has_components = 0;
+  check(NMR::lib3mf_object_iscomponentsobject(object, &has_components), "an object");
+  if (has_components == 0) {
+    model.objects.push_back(read_object(object));
+    return;
+  }
+  model.together = text_of("a name", NMR::lib3mf_object_getnameutf8, object);
+  DWORD components = 0;
+  check(NMR::lib3mf_componentsobject_getcomponentcount(object, &components), "components");
+  for (DWORD n = 0; n < components; ++n) {
+    const Held component =
+        object_of("a component", NMR::lib3mf_componentsobject_getcomponent, object, n);
+    BOOL is_moved = 0;
+    check(NMR::lib3mf_component_hastransform(in(component), &is_moved), "a place");
+    refuse_if(is_moved != 0);
+    read_objects(in(object_of("an object", NMR::lib3mf_component_getobjectresource, in(component))),
+                 model);
+  }
 }
 
 }  // namespace
@@ -116,8 +138,12 @@ Model3mf read_with_lib3mf(const std::string& bytes) {
   BOOL has_next = 0;
   while (check(NMR::lib3mf_builditemiterator_movenext(in(items), &has_next), "items"), has_next) {
     const Held item = object_of("an item", NMR::lib3mf_builditemiterator_getcurrent, in(items));
-    const Held object = object_of("an object", NMR::lib3mf_builditem_getobjectresource, in(item));
-    result.objects.push_back(read_object(in(model), in(object)));
+    BOOL is_moved = 0;
+    check(NMR::lib3mf_builditem_hasobjecttransform(in(item), &is_moved), "a place");
+    refuse_if(is_moved != 0);
+    ++result.items;
+    read_objects(in(object_of("an object", NMR::lib3mf_builditem_getobjectresource, in(item))),
+                 result);
   }
   return result;
 }

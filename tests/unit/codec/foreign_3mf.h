@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ struct Object3mf {
   std::string name;
   std::string part_number;
   bool is_model = false;  // or of another type
-  std::array<std::uint8_t, 3> color = {};
+  std::optional<std::array<std::uint8_t, 3>> color = {};
   std::vector<mesh::Vec3> points;
   std::vector<mesh::Triangle> triangles;
 };
@@ -23,10 +24,13 @@ struct Object3mf {
 struct Model3mf {
   bool is_in_millimetres = false;
   std::map<std::string, std::string> metadata;
-  std::vector<Object3mf> objects;  // that are built, in their order
+  std::size_t items = 0;           // of the build
+  std::string together;            // the name of an object that has components
+  std::vector<Object3mf> objects;  // that are built, with a mesh, in their order
 };
 
-// Throws std::runtime_error where lib3mf refuses the file, or warns of anything.
+// Throws std::runtime_error where lib3mf refuses the file, or warns of anything, and for objects
+// that the file moves or turns.
 Model3mf read_with_lib3mf(const std::string& bytes);
 
 }  // namespace isomesh::test

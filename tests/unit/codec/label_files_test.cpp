@@ -326,8 +326,15 @@ TEST_F(LabelFilesTest, ObjHasAGroupForEachLabel) {
 
 TEST_F(LabelFilesTest, ThreeMfHasAnObjectWithNameColourAndValueForEachLabel) {
   labels_[2].name = "a < b & \"c\"\x01";
-  const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
+  const std::string bytes = encoded(MeshFormat::k3mf);
+  EXPECT_EQ(test::objects_in(bytes, "3mf").size(), kLabels);
+  const test::Model3mf model = test::read_with_lib3mf(bytes);
   EXPECT_TRUE(model.is_in_millimetres);
+  EXPECT_EQ(model.items, 1U);
+  EXPECT_EQ(model.together, "5 labels");
+  EXPECT_EQ(model.metadata.at("Title"), "5 labels");
+  EXPECT_EQ(model.metadata.at("Description"),
+            "The surface of 5 labels. Coordinates in LPS, in millimetres.");
   ASSERT_EQ(model.objects.size(), kLabels);
   std::vector<Places> places;
   for (std::size_t n = 0; n < kLabels; ++n) {
@@ -342,6 +349,19 @@ TEST_F(LabelFilesTest, ThreeMfHasAnObjectWithNameColourAndValueForEachLabel) {
   EXPECT_EQ(model.objects[1].color, (std::array<std::uint8_t, 3>{0xff, 0x80, 0}));
   EXPECT_NE(model.objects[0].color, model.objects[2].color);
   expect_shared(places);
+}
+
+TEST_F(LabelFilesTest, ThreeMfOfOneLabelIsThatObject) {
+  const auto volume = mesh::label_cells(1, {12, 12, 12}, 4, 401);
+  mesh::separate_into(walls_, volume, {{1, 2}, Scheme::kSix, true});
+  triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
+  labels_ = {{.label = 1, .name = "Liver"}, {.label = 2, .name = "Spleen"}};
+  const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
+  EXPECT_EQ(model.items, 1U);
+  EXPECT_EQ(model.together, "");
+  ASSERT_EQ(model.objects.size(), 1U);
+  EXPECT_EQ(model.objects[0].name, "Liver");
+  EXPECT_EQ(model.metadata.at("Title"), "Liver");
 }
 
 TEST_F(LabelFilesTest, AFileOfOneSurfaceIsNoFileOfAllLabels) {
