@@ -70,7 +70,9 @@ def triangles(file, surfaces):
     count = sum(s['triangles'] or 0 for s in surfaces)
     if surfaces[0]['triangles'] is None:
         return 'opens', True
-    vertices = sum(s['vertices'] for s in surfaces)
+    if vertices == 0 and surfaces[0]['vertices'] is not None:
+        return '0 vertices', False
+    vertices = sum(s['vertices'] or 0 for s in surfaces)
     if count != file.triangles:
         return f'{count} of {file.triangles}', False
     if vertices and vertices == 3 * count and file.suffix != 'stl':
@@ -129,7 +131,7 @@ def cells(file, answer):
     result = {'triangles': triangles(file, surfaces), 'place': place(file, surfaces)}
     told = {key for s in surfaces for key in s}
     if file.labels and file.suffix in ('ply', 'vtk', 'vtp'):
-        result['labels'] = labels(file, surfaces)
+        result['labels'] = labels(file, surfaces) if 'labels' in told else ('–', True)
     elif file.labels:
         result['names'] = names(file, surfaces) if 'name' in told else ('–', True)
     if file.labels and file.suffix not in ('vtk', 'vtp'):

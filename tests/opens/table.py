@@ -8,10 +8,10 @@ KINDS += ['vtk', 'vtp', 'gii']
 MAIN = {'drc': 'ball', 'stl': 'ball', 'off': 'ball', 'gii': 'ball'}
 COLUMNS = ['triangles', 'place', 'names', 'colours', 'labels', 'normals', 'distances']
 SPECIAL = {
-    'open': 'A surface that is not closed',
-    'lods': 'Two levels of detail',
-    'distances': 'Distances',
-    'head': 'A surface of several primitives',
+    'open': 'a surface that is not closed',
+    'lods': 'two levels of detail',
+    'distances': 'distances',
+    'head': 'a large surface',
 }
 
 
@@ -76,11 +76,9 @@ def write(path, readers, files, answers):
     lines = ['## Which format in which program', *overview(named, judged), '', '## What arrives']
     for kind in KINDS:
         lines += ['', f'### {title(kind)}', *details(named, judged, f'{MAIN.get(kind, "atlas")}-{kind}')]
-    for shape, words in SPECIAL.items():
-        lines += ['', f'## {words}']
-        for file in files:
-            if file.shape == shape:
-                lines += ['', f'### {words}: {title(file.kind)}', *details(named, judged, file.name)]
+    for file in files:
+        if file.shape in SPECIAL:
+            lines += ['', f'### {title(file.kind)}: {SPECIAL[file.shape]}', *details(named, judged, file.name)]
     text = path.read_text()
     begin, end = '<!-- tests/opens/run writes from here -->\n', '\n<!-- to here -->'
     made = re.sub(f'{begin}.*?{end}', lambda _: begin + '\n'.join(lines) + end, text, flags=re.DOTALL)

@@ -18,7 +18,7 @@ def read(path, _):
         out = os.path.join(folder, 'out.stl')
         said('prusa-slicer', '--export-stl', '--dont-arrange', '--no-ensure-on-bed', '--output', out, path)
         found = surface_of_stl(out)
-    return [{**found, 'triangles': sum(counts), 'vertices': 0}]
+    return [{**found, 'triangles': sum(counts), 'vertices': None}]
 
 
 main(package_version('prusa-slicer'), read)
