@@ -369,8 +369,8 @@ constinit const Parameter kDistances = {
     .title = "Write vertex distances to GLB",
     .help = "Write each vertex's distance to the extracted surface to `glb`, in millimetres.",
     .more =
-        "The vertex attribute is `_DISTANCE_MM`; every level of detail has it. Values "
-        "are rounded to a four thousandth of the largest. The page shows them as "
+        "The vertex attribute is `_DISTANCE_MM`; every level of detail has it. With the codec "
+        "`draco`, values are rounded to a four thousandth of the largest. The page shows them as "
         "colours. The formats must include `glb`.",
     .needs = MeshFormat::kGlb,
     .may_be_absent = true};
@@ -395,7 +395,8 @@ constinit const Parameter kMerge = {
     .help = "Write the surface to `glb` as one primitive; with labels, as one per label.",
     .more =
         "For programs that take each primitive for a separate object. Otherwise there is "
-        "one per hundred thousand triangles or so; they are written and read in parallel.",
+        "one per hundred thousand triangles or so; they are written and read in parallel. "
+        "With the codec `none`, there is always one.",
     .may_be_absent = true};
 
 constinit const Parameter kGlbCodec = {
@@ -403,10 +404,16 @@ constinit const Parameter kGlbCodec = {
     .title = "GLB compression",
     .help = "How the surface in `glb` is compressed.",
     .more =
-        "`draco` is KHR_draco_mesh_compression and makes smaller files. "
-        "`meshopt` is EXT_meshopt_compression and is read faster. Readers "
-        "must support the one that is used.",
-    .values = {"Smaller files", "Files that are read faster"},
+        "`draco` is KHR_draco_mesh_compression and makes the smallest files. `none` needs no "
+        "extension: exact floats in one primitive for each surface, for every reader of glTF, "
+        "with about ten times as many bytes. `meshopt` is EXT_meshopt_compression and is read "
+        "faster than `draco`; `khr-meshopt` is the same under the newer name "
+        "KHR_meshopt_compression. `quantized` is KHR_mesh_quantization: rounded numbers that "
+        "are not compressed. Readers must support the one that is used. `isomesh mesh` asks for "
+        "`none` by default.",
+    .values = {"The smallest files", "Exact floats, for every reader of glTF",
+               "Files that are read faster", "The same, by the newer name of the extension",
+               "Rounded numbers without compression"},
     .may_be_absent = true};
 
 constinit const Parameter kSpace = {

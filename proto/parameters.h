@@ -35,7 +35,9 @@ constexpr Scheme scheme_of(SchemeName name) {
 }
 
 enum class Interpolation { kLinear, kMidpoint };
-enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
+// KHR_draco_mesh_compression, floats as they are, EXT_meshopt_compression, KHR_meshopt_compression,
+// KHR_mesh_quantization.
+enum class GlbCodec { kDraco, kNone, kMeshopt, kKhrMeshopt, kQuantized };
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {

@@ -63,8 +63,10 @@ struct Names<MeshFormat> {
 
 template <>
 struct Names<GlbCodec> {
-  static constexpr std::array kTable = {std::pair{GlbCodec::kDraco, "draco"},
-                                        std::pair{GlbCodec::kMeshopt, "meshopt"}};
+  static constexpr std::array kTable = {
+      std::pair{GlbCodec::kDraco, "draco"}, std::pair{GlbCodec::kNone, "none"},
+      std::pair{GlbCodec::kMeshopt, "meshopt"}, std::pair{GlbCodec::kKhrMeshopt, "khr-meshopt"},
+      std::pair{GlbCodec::kQuantized, "quantized"}};
 };
 
 template <>

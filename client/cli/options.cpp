@@ -25,6 +25,10 @@
 namespace isomesh::cli {
 namespace {
 
+// The codec of a GLB that is saved, unless --glb-codec names another: programs on a desktop open
+// it, and many of them decode nothing.
+constexpr GlbCodec kSavedGlbCodec = GlbCodec::kNone;
+
 constexpr const char* kDescription =
     "Turns medical volumes into surface meshes, on an isomesh server or on this computer alone.";
 
@@ -203,6 +207,7 @@ class Parser {
     if (options_.outputs.empty() && !outputs_.formats.empty()) {
       options_.parameters.formats = outputs_.formats;
     }
+    if (options_.command == Command::kMesh) choose_glb_codec();
     if (options_.command == Command::kMesh) check_mesh();
     if (options_.command == Command::kFetch && options_.outputs.empty()) {
       wrong_usage("-o is required");
@@ -293,7 +298,10 @@ class Parser {
                  "Leave out each FILE whose meshes are all newer than it, such as those of a run "
                  "that was interrupted. Other options are not compared");
     add_allow_empty(app, options_, kWriteEmpty);
+    // Help tells this default; choose_glb_codec applies it.
+    const GlbCodec usual = std::exchange(options_.parameters.glb_codec, kSavedGlbCodec);
     add_parameters(app, options_.parameters, options_.preset, Formats::kByFiles);
+    options_.parameters.glb_codec = usual;
     add_raw(app, options_);
   }
 
@@ -321,6 +329,17 @@ class Parser {
       if (!std::ranges::all_of(option->results(), is_utf8)) {
         wrong_usage(option->get_name() + ": is not UTF-8; this is the encoding of all texts");
       }
+    }
+  }
+
+  // A job without a GLB keeps the usual codec, so that it can share its mesh with those of other
+  // clients.
+  void choose_glb_codec() {
+    const auto formats =
+        options_.outputs.empty() ? options_.parameters.formats : formats_of(options_.outputs);
+    const bool has_glb = std::ranges::find(formats, MeshFormat::kGlb) != formats.end();
+    if (has_glb && app_.get_subcommands().front()->get_option("--glb-codec")->count() == 0) {
+      options_.parameters.glb_codec = kSavedGlbCodec;
     }
   }
 

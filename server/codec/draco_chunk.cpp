@@ -24,17 +24,10 @@ void for_each_triangle(const mesh::Mesh& mesh, const Run& run, Visit visit) {
 
 void set_bounds(std::span<const mesh::Vec3> positions, const Grid& grid, DracoStream& stream) {
   if (positions.empty()) return;
-  mesh::Vec3 low = positions[0];
-  mesh::Vec3 high = low;
-  for (const mesh::Vec3& position : positions) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], position[axis]);
-      high[axis] = std::max(high[axis], position[axis]);
-    }
-  }
+  const Bounds bounds = bounds_of(positions);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    stream.low[axis] = grid.decoded(low[axis], axis);
-    stream.high[axis] = grid.decoded(high[axis], axis);
+    stream.bounds.low[axis] = grid.decoded(bounds.low[axis], axis);
+    stream.bounds.high[axis] = grid.decoded(bounds.high[axis], axis);
   }
 }
 

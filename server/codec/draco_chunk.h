@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/mutex.h"
+#include "server/codec/bounds.h"
 #include "server/codec/draco/encoder.h"
 #include "server/codec/draco/grid.h"
 #include "server/mesh/mesh.h"
@@ -25,8 +26,7 @@ struct DracoStream {
   std::uint32_t position_id = 0;  // the attributes' ids within the stream
   std::uint32_t normal_id = 0;
   std::uint32_t distance_id = 0;
-  mesh::Vec3 low = {0, 0, 0};  // bounds of the decoded positions
-  mesh::Vec3 high = {0, 0, 0};
+  Bounds bounds = {};  // of the decoded positions
   // The topology of the triangles, found during encoding, in the mesh's vertex numbers. libdraco
   // reports none.
   std::optional<mesh::PartTopology> topology;
@@ -51,6 +51,9 @@ using Block = std::vector<Run>;
 // runs, and a block stacks the runs at one place of consecutive layers. Every triangle is in one
 // block. No block is empty.
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
+
+// The name of distances in files. glTF requires the underscore for application-specific attributes.
+inline constexpr const char* kDistanceAttribute = "_DISTANCE_MM";
 
 // Vertex attributes beside the positions; each has one element per position or none.
 struct VertexData {

@@ -65,9 +65,9 @@ struct FileContent {
 // Encoders of one format each. They throw Error kCancelled. A surface of labels contains each
 // label's own surface, complete and oriented outward: a wall between two labels occurs once for
 // each. An encoder returns the topology of one surface if it found it on the way; it equals
-// measure_topology's. Positions are converted to the content's space. Except for Draco and GLB,
-// files are streamed in a few megabytes of memory and formatted in parallel. The bytes never depend
-// on the number of threads.
+// measure_topology's. Positions are converted to the content's space. Except for Draco and GLB
+// with a codec, files are streamed in a few megabytes of memory. The bytes never depend on the
+// number of threads.
 using Encoder = std::optional<mesh::Topology>(const FileContent& content,
                                               const mesh::Context& context, const Sink& sink);
 
@@ -119,6 +119,11 @@ Encoder encode_gii;
 // Binary glTF 2.0: one primitive per block of about 100 000 triangles, each a Draco stream of its
 // own (KHR_draco_mesh_compression), encoded in parallel. All share one quantisation grid, so
 // vertices on a seam between blocks decode to the same bits, and so do their normals, if requested.
+// parameters.glb_codec has other codecs; array_chunk.h describes their arrays. Without one (kNone),
+// a surface is one primitive with the mesh's own vertices, which is streamed from the mesh; if it
+// is closed, manifold and oriented, EXT_mesh_manifold says so. Then the topology of one surface is
+// always returned.
+//
 // Positions are LPS millimetres under a node that transforms them to glTF's metres with Y up. With
 // parameters.lods, coarser levels (MSFT_lod) are nodes like that one outside the scene, each
 // simplified from the mesh without an error bound, on the same grid. A level without fewer

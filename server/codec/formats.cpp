@@ -7,6 +7,7 @@
 #include <string>
 
 #include "proto/error.h"
+#include "server/codec/array_chunk.h"
 #include "server/codec/decode/decoders.h"
 #include "server/codec/levels.h"
 
@@ -34,6 +35,8 @@ double levels_of(const MeshParameters& parameters) {
              : std::accumulate(parameters.lods.begin(), parameters.lods.end(), 0.0);
 }
 
+bool always(const MeshParameters& /*parameters*/) { return true; }
+
 bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
 
 std::optional<mesh::Topology> encode_turned_drc(const FileContent& content,
@@ -41,6 +44,65 @@ std::optional<mesh::Topology> encode_turned_drc(const FileContent& content,
   return use_in_space(content.mesh, content.space, [&](const mesh::Mesh& mesh) {
     return encode_drc(mesh, content.provenance.parameters.draco, context, sink);
   });
+}
+
+// The bytes of a vertex in GLB with draco or meshopt; measured.
+double compressed_glb_vertex(const MeshParameters& parameters) {
+  constexpr double kNormalBytes = 1.5;
+  constexpr double kDistanceBytes = 1.5;
+  constexpr double kMeshoptBytes = 7;
+  return (parameters.glb_codec == GlbCodec::kDraco ? draco_bytes_per_vertex(2.7, parameters)
+                                                   : kMeshoptBytes) +
+         (parameters.normals ? kNormalBytes : 0) + (parameters.distances ? kDistanceBytes : 0);
+}
+
+double glb_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
+  constexpr double kVectorOfFloats = 12;
+  constexpr double kVectorOfSteps = 8;
+  constexpr double kVectorOfBytes = 4;
+  double vertex = parameters.distances ? sizeof(float) : 0;
+  double triangle = 0;
+  if (parameters.glb_codec == GlbCodec::kNone) {
+    vertex += parameters.normals ? 2 * kVectorOfFloats : kVectorOfFloats;
+    triangle = sizeof(mesh::Triangle);
+  } else if (parameters.glb_codec == GlbCodec::kQuantized) {
+    constexpr double kOnSeams = 1.05;  // blocks have the vertices between them twice
+    vertex += parameters.draco.position_bits <= kMostStepBits ? kVectorOfSteps : kVectorOfFloats;
+    vertex = kOnSeams * (vertex + (parameters.normals ? kVectorOfBytes : 0));
+    triangle = parameters.merge ? sizeof(mesh::Triangle) : 3 * sizeof(std::uint16_t);
+  } else {
+    vertex = compressed_glb_vertex(parameters);
+  }
+  return 2000 + levels_of(parameters) * (as_double(surface.vertices) * vertex +
+                                         as_double(surface.triangles) * triangle);
+}
+
+std::uint64_t glb_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
+  // Measured: its blocks and their bytes.
+  constexpr std::uint64_t kPerTriangle = 15;
+  constexpr std::uint64_t kNormalsPerTriangle = 8;
+  // Arrays of all vertices and triangles of a primitive.
+  constexpr std::uint64_t kArraysPerTriangle = 40;
+  constexpr std::uint64_t kMergedPerTriangle = 75;
+  // A copy of the surface and its simplification.
+  constexpr std::uint64_t kLevelsPerTriangle = 130;
+  // Without a codec: one label's surface, which can be almost everything; the coarser levels.
+  constexpr std::uint64_t kLabelPerTriangle = 40;
+  constexpr std::uint64_t kKeptPerTriangle = 30;
+  std::uint64_t bytes = parameters.normals ? surface.vertices * sizeof(mesh::Vec3) : 0;
+  if (parameters.distances) bytes += surface.vertices * 2 * sizeof(float);
+  if (parameters.lods.size() > 1) bytes += surface.triangles * kLevelsPerTriangle;
+  if (parameters.glb_codec == GlbCodec::kNone) {
+    if (parameters.labels) bytes += surface.triangles * kLabelPerTriangle;
+    const double coarser = levels_of(parameters) - 1;
+    return bytes +
+           static_cast<std::uint64_t>(coarser * as_double(surface.triangles)) * kKeptPerTriangle;
+  }
+  bytes += surface.triangles * kPerTriangle;
+  if (parameters.normals) bytes += surface.triangles * kNormalsPerTriangle;
+  if (parameters.glb_codec != GlbCodec::kDraco) bytes += surface.triangles * kArraysPerTriangle;
+  if (parameters.merge) bytes += surface.triangles * kMergedPerTriangle;
+  return bytes;
 }
 
 double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
@@ -87,48 +149,17 @@ constexpr std::array kFormats = {
     Format{.format = MeshFormat::kGlb,
            .media_type = "model/gltf-binary",
            .milliseconds_per_triangle = 4.0e-5,
-           .bytes =
-               [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // Per vertex; measured.
-                 constexpr double kNormalBytes = 1.5;
-                 constexpr double kDistanceBytes = 1.5;
-                 constexpr double kMeshoptBytes = 7;
-                 double more = 0;
-                 if (parameters.normals) more += kNormalBytes;
-                 if (parameters.distances) more += kDistanceBytes;
-                 const double surface_bytes = parameters.glb_codec == GlbCodec::kMeshopt
-                                                  ? kMeshoptBytes
-                                                  : draco_bytes_per_vertex(2.7, parameters);
-                 return 2000 + as_double(surface.vertices) * levels_of(parameters) *
-                                   (surface_bytes + more);
+           .bytes = glb_bytes,
+           .has_exact_bytes =
+               [](const MeshParameters& parameters) {
+                 return parameters.glb_codec == GlbCodec::kNone && parameters.lods.size() <= 1;
                },
-           .memory_bytes =
-               [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // Measured: its blocks and their bytes.
-                 constexpr std::uint64_t kPerTriangle = 15;
-                 constexpr std::uint64_t kNormalsPerTriangle = 8;
-                 // Arrays of all vertices and triangles of a primitive.
-                 constexpr std::uint64_t kMeshoptPerTriangle = 40;
-                 constexpr std::uint64_t kMergedPerTriangle = 75;
-                 // A copy of the surface and its simplification.
-                 constexpr std::uint64_t kLevelsPerTriangle = 130;
-                 std::uint64_t bytes = surface.triangles * kPerTriangle;
-                 if (parameters.normals) {
-                   bytes += surface.vertices * sizeof(mesh::Vec3) +
-                            surface.triangles * kNormalsPerTriangle;
-                 }
-                 if (parameters.glb_codec == GlbCodec::kMeshopt) {
-                   bytes += surface.triangles * kMeshoptPerTriangle;
-                 }
-                 if (parameters.merge) bytes += surface.triangles * kMergedPerTriangle;
-                 if (parameters.distances) bytes += surface.vertices * 2 * sizeof(float);
-                 if (parameters.lods.size() > 1) bytes += surface.triangles * kLevelsPerTriangle;
-                 return bytes;
-               },
+           .memory_bytes = glb_memory,
            .shows_topology =
                [](const MeshParameters& parameters) {
-                 return parameters.glb_codec == GlbCodec::kDraco && if_ours(parameters) &&
-                        !parameters.distances;
+                 return parameters.glb_codec == GlbCodec::kNone ||
+                        (parameters.glb_codec == GlbCodec::kDraco && if_ours(parameters) &&
+                         !parameters.distances);
                },
            .encode = encode_glb,
            .decode = decoding::decode_glb},
@@ -137,7 +168,7 @@ constexpr std::array kFormats = {
            .milliseconds_per_triangle = 3.0e-5,
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
-           .has_exact_bytes = true,
+           .has_exact_bytes = always,
            .encode = encode_stl},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
@@ -148,7 +179,7 @@ constexpr std::array kFormats = {
                  return 300 + vertex_bytes * as_double(surface.vertices) +
                         13 * as_double(surface.triangles);
                },
-           .has_exact_bytes = true,
+           .has_exact_bytes = always,
            .memory_bytes = label_memory,
            .encode = encode_ply},
     Format{.format = MeshFormat::kObj,
@@ -197,7 +228,7 @@ constexpr std::array kFormats = {
                  return 200 + 12 * as_double(surface.vertices) +
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
-           .has_exact_bytes = true,
+           .has_exact_bytes = always,
            .encode = encode_vtk},
     Format{.format = MeshFormat::kVtp,
            .media_type = kUnregistered,
@@ -207,7 +238,7 @@ constexpr std::array kFormats = {
                  return 4000 + 12 * as_double(surface.vertices) +
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
-           .has_exact_bytes = true,
+           .has_exact_bytes = always,
            .encode = encode_vtp},
     Format{.format = MeshFormat::kGii,
            .media_type = kUnregistered,
@@ -251,6 +282,7 @@ const Format& describe(MeshFormat format) {
 }
 
 bool rounds(MeshFormat format, const MeshParameters& parameters) {
+  if (format == MeshFormat::kGlb && parameters.glb_codec == GlbCodec::kNone) return false;
   if (format != MeshFormat::kZip) return describe(format).decode != nullptr;
   return std::ranges::any_of(zipped_formats(parameters),
                              [&](MeshFormat each) { return rounds(each, parameters); });

@@ -26,7 +26,9 @@ struct Format {
   // The estimated size of the file.
   double (*bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
   // True if that is exact but for the header, given the vertices and triangles of the file.
-  bool has_exact_bytes = false;
+  bool (*has_exact_bytes)(const MeshParameters& parameters) = [](const MeshParameters&) {
+    return false;
+  };
   // The encoder's peak memory without the mesh; an upper estimate.
   std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface,
                                 const MeshParameters& parameters) =
@@ -37,15 +39,16 @@ struct Format {
   };
   Encoder* encode;  // null for a format that holds files of labels only
   // Null for a format that holds the mesh's triangles and floats exactly, in the file's space; by
-  // labels, the triangles of each label's own surface. Other formats round coordinates.
+  // labels, the triangles of each label's own surface. Other formats round coordinates, GLB unless
+  // it has no codec.
   DecodedSurface (*decode)(std::span<const std::byte> file, const mesh::Context& context) = nullptr;
 };
 
 // Constant time.
 const Format& describe(MeshFormat format);
 
-// True if a job's file of that format rounds coordinates or contains files that do: drc, glb, and a
-// ZIP of drc.
+// True if a job's file of that format rounds coordinates or contains files that do: drc, glb unless
+// it has no codec, and a ZIP of drc.
 bool rounds(MeshFormat format, const MeshParameters& parameters);
 
 // Calls the format's encoder. Only GLB with distances uses `extracted`. Returns the mesh's topology

@@ -1,6 +1,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <span>
 #include <string>
@@ -12,6 +13,7 @@
 #include "server/codec/glb_document.h"
 #include "server/codec/label_titles.h"
 #include "server/codec/levels.h"
+#include "server/codec/plain_chunk.h"
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/measure/normals.h"
 #include "server/mesh/parallel.h"
@@ -64,10 +66,10 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
   const std::vector<Block> blocks = parameters.merge
                                         ? std::vector<Block>{{{0, mesh.triangles.size()}}}
                                         : cut_blocks(mesh, kTrianglesPerBlock);
-  if (parameters.glb_codec == GlbCodec::kMeshopt) {
+  if (parameters.glb_codec != GlbCodec::kDraco) {
     level.arrays.resize(blocks.size());
     mesh::parallel_for(context, blocks.size(), [&](std::size_t i) {
-      level.arrays[i] = encode_with_meshopt(mesh, blocks[i], grid, data);
+      level.arrays[i] = encode_arrays(mesh, blocks[i], grid, data, parameters.glb_codec);
     });
     return level;
   }
@@ -83,12 +85,24 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
   return level;
 }
 
+bool is_plain(const MeshParameters& parameters) { return parameters.glb_codec == GlbCodec::kNone; }
+
+// A level that will be written from the mesh itself.
+GlbLevel plain_level(double share, const mesh::Mesh& mesh, const MeshParameters& parameters,
+                     const mesh::Topology& topology) {
+  GlbLevel level = {.share = share};
+  if (mesh.triangles.size() == 0) return level;
+  level.arrays.push_back(describe_plain(mesh, parameters));
+  level.is_solid = topology.boundary_edges == 0 && topology.manifold && topology.oriented;
+  return level;
+}
+
 void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
   sink(std::as_bytes(std::span(words.begin(), words.size())));
 }
 
 void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenance& provenance,
-               const Sink& sink) {
+               const mesh::Context& context, const Sink& sink) {
   const GlbLayout layout(parts);
   const std::size_t binary_bytes = layout.bytes();
   std::string json = glb_document(parts, layout, grid, provenance);
@@ -101,20 +115,25 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge,
                 "The encoded surface exceeds the 4 GiB that a GLB file can hold. Set \"triangles\" "
-                "to simplify it.");
+                "to simplify it" +
+                    std::string(provenance.parameters.glb_codec == GlbCodec::kDraco
+                                    ? "."
+                                    : ", or \"glb_codec\" to \"draco\" to compress it."));
   }
   write_words(sink, {kMagic, kVersion, static_cast<std::uint32_t>(total)});
   write_words(sink, {static_cast<std::uint32_t>(json.size()), kJsonChunk});
   sink(std::as_bytes(std::span(json)));
   if (binary_bytes == 0) return;
   write_words(sink, {static_cast<std::uint32_t>(binary_bytes), kBinaryChunk});
-  constexpr std::array<std::byte, kGlbAlignment> kZeros = {};
-  for (const GlbLevel* level : layout.order()) {
-    level->for_each_chunk([&](std::span<const std::byte> bytes) {
-      sink(bytes);
-      sink(std::span(kZeros).first(glb_padded(bytes.size()) - bytes.size()));
-    });
-  }
+  std::size_t written = 0;
+  const Sink counted = [&](std::span<const std::byte> bytes) {
+    sink(bytes);
+    written += bytes.size();
+    if (context.progress) {
+      context.progress(static_cast<double>(written) / static_cast<double>(binary_bytes));
+    }
+  };
+  for (const GlbLevel* level : layout.order()) level->put(counted);
 }
 
 GlbPart part_of(const LabelSummary& label) {
@@ -133,21 +152,31 @@ std::uint64_t count_of(double share, const mesh::Mesh& mesh) {
   return static_cast<std::uint64_t>(share * static_cast<double>(mesh.triangles.size()));
 }
 
+// The part of the progress before the file is written: plain levels are written from their meshes,
+// while others are encoded before.
+double made_share(const MeshParameters& parameters) { return is_plain(parameters) ? 0.5 : 1; }
+
 // The part of the progress of one level, and within it of simplification, which takes most of the
 // time.
 struct LevelProgress {
   mesh::Context simplify;
   mesh::Context encode;
 
-  LevelProgress(const mesh::Context& context, std::size_t level, std::size_t levels) {
+  LevelProgress(const mesh::Context& context, const MeshParameters& parameters, std::size_t level) {
     constexpr double kSimplifyShare = 0.8;
-    const auto count = static_cast<double>(levels);
-    const double begin = static_cast<double>(level) / count;
-    const double encoding = level == 0 ? begin : begin + kSimplifyShare / count;
+    const double each = made_share(parameters) /
+                        static_cast<double>(std::max<std::size_t>(1, parameters.lods.size()));
+    const double begin = static_cast<double>(level) * each;
+    const double encoding = level == 0 ? begin : begin + kSimplifyShare * each;
     simplify = context.part(begin, encoding);
-    encode = context.part(encoding, static_cast<double>(level + 1) / count);
+    encode = context.part(encoding, begin + each);
   }
 };
+
+mesh::Context writing(const mesh::Context& context, const MeshParameters& parameters) {
+  return is_plain(parameters) ? context.part(made_share(parameters), 1)
+                              : mesh::Context{context.stop, nullptr};
+}
 
 Distances of_label(const Distances& of_walls, const LabelledSurface& surface, std::size_t number) {
   const auto vertices = vertices_of_label(surface.walls, surface.triangles, number);
@@ -159,73 +188,138 @@ Distances of_label(const Distances& of_walls, const LabelledSurface& surface, st
   return own;
 }
 
+// The own surface of a label, with normals and distances as the parameters ask.
+struct OwnSurface {
+  OwnSurface(const LabelledSurface& surface, std::size_t number, const Distances& of_walls,
+             const MeshParameters& parameters, const mesh::Context& context) {
+    extract_label(surface.walls, surface.triangles, number, mesh);
+    if (parameters.normals) shade_label(surface.walls, surface.triangles, number, context, mesh);
+    if (parameters.distances) distances = of_label(of_walls, surface, number);
+  }
+
+  mesh::Mesh mesh;
+  Distances distances;
+};
+
+// The walls of one level.
+struct WallLevel {
+  LabelledSurface surface;
+  Distances distances;  // computed on the walls, so touching labels have the same
+};
+
+// The walls and `parameters` must outlive the level.
+GlbLevel plain_label(const WallLevel& walls, std::size_t number, double share,
+                     const MeshParameters& parameters, const mesh::Context& context) {
+  const mesh::OneThread alone;
+  mesh::Mesh mesh;
+  extract_label(walls.surface.walls, walls.surface.triangles, number, mesh);
+  GlbLevel level = plain_level(share, mesh, parameters, measure_topology(mesh, context));
+  level.put_arrays = [&walls, number, &parameters, context](const Sink& sink) {
+    const OwnSurface own(walls.surface, number, walls.distances, parameters, context);
+    put_plain(own.mesh, parameters, own.distances.values.span(), context, sink);
+  };
+  return level;
+}
+
 // Adds a level to all parts, from the walls or simplified ones.
-void add_levels(const LabelledSurface& surface, double share, const Grid& grid,
+void add_levels(const WallLevel& walls, double share, const Grid& grid,
                 const MeshParameters& parameters, const mesh::Context& context,
                 std::vector<GlbPart>& parts) {
   const mesh::Context quiet = {context.stop, nullptr};
-  // Computed on the walls, so touching labels have the same.
-  const Distances of_walls(surface.walls.mesh, parameters, surface.extracted, quiet);
   mesh::parallel_for(context, parts.size(), [&](std::size_t n) {
-    mesh::Mesh mesh;
-    extract_label(surface.walls, surface.triangles, n + 1, mesh);
-    if (parameters.normals) shade_label(surface.walls, surface.triangles, n + 1, quiet, mesh);
-    const Distances own = parameters.distances ? of_label(of_walls, surface, n + 1) : Distances();
-    parts[n].add_level(encode_level(share, mesh, own, grid, parameters, quiet));
+    if (is_plain(parameters)) {
+      return parts[n].add_level(plain_label(walls, n + 1, share, parameters, quiet));
+    }
+    const OwnSurface own(walls.surface, n + 1, walls.distances, parameters, quiet);
+    parts[n].add_level(encode_level(share, own.mesh, own.distances, grid, parameters, quiet));
   });
 }
+
+// The walls of a coarser level.
+struct CoarseWalls {
+  explicit CoarseWalls(const mesh::SeparatingSurface& coarse)
+      : walls(copy_of(coarse)), triangles(walls) {}
+
+  mesh::SeparatingSurface walls;
+  mesh::LabelTriangles triangles;
+  std::optional<WallLevel> level = {};
+};
 
 void encode_labels(const LabelledSurface& surface, const Provenance& provenance,
                    const mesh::Context& context, const Sink& sink) {
   const MeshParameters& parameters = provenance.parameters;
+  const mesh::Context quiet = {context.stop, nullptr};
   const auto shares = coarser_shares(parameters);
   const Grid grid = grid_of(surface.walls.mesh, parameters.draco.position_bits);
   std::vector<GlbPart> parts;
   for (const LabelSummary& label : surface.labels) parts.push_back(part_of(label));
-  const LevelProgress finest(context, 0, shares.size() + 1);
-  add_levels(surface, 1, grid, parameters, finest.encode, parts);
+  const auto level_of = [&](const LabelledSurface& walls) {
+    return WallLevel{walls, {walls.walls.mesh, parameters, surface.extracted, quiet}};
+  };
+  const WallLevel finest = level_of(surface);
+  add_levels(finest, 1, grid, parameters, LevelProgress(context, parameters, 0).encode, parts);
   mesh::SeparatingSurface coarse;
   if (!shares.empty()) coarse = copy_of(surface.walls);
+  std::deque<CoarseWalls> kept;  // plain files are written from all of them
   for (std::size_t n = 0; n < shares.size(); ++n) {
-    const LevelProgress progress(context, n + 1, shares.size() + 1);
+    const LevelProgress progress(context, parameters, n + 1);
     coarsen(count_of(shares[n], surface.walls.mesh), progress.simplify, coarse);
-    const mesh::LabelTriangles triangles(coarse);
-    add_levels({coarse, triangles, surface.labels, surface.extracted}, shares[n], grid, parameters,
-               progress.encode, parts);
+    if (!is_plain(parameters)) kept.clear();
+    CoarseWalls& own = kept.emplace_back(coarse);
+    own.level.emplace(level_of({own.walls, own.triangles, surface.labels, surface.extracted}));
+    add_levels(*own.level, shares[n], grid, parameters, progress.encode, parts);
   }
-  write_glb(parts, grid, provenance, sink);
+  write_glb(parts, grid, provenance, writing(context, parameters), sink);
+}
+
+std::optional<mesh::Topology> encode_surface(const FileContent& content,
+                                             const mesh::Context& context, const Sink& sink) {
+  const mesh::Mesh& mesh = content.mesh;
+  const MeshParameters& parameters = content.provenance.parameters;
+  const mesh::Context quiet = {context.stop, nullptr};
+  const auto shares = coarser_shares(parameters);
+  const Grid grid = grid_of(mesh, parameters.draco.position_bits);
+  std::optional<mesh::Topology> topology;  // of the finest level
+  std::deque<mesh::Mesh> kept;             // plain files are written from all levels
+  const auto level_of = [&](double share, const mesh::Mesh& level, const mesh::Context& progress) {
+    const auto distances_of = [&parameters, &content, quiet](const mesh::Mesh& of) {
+      return Distances(of, parameters, content.extracted, quiet);
+    };
+    if (!is_plain(parameters)) {
+      return encode_level(share, level, distances_of(level), grid, parameters, progress);
+    }
+    const mesh::Topology found = measure_topology(level, quiet);
+    if (progress.progress) progress.progress(1);
+    if (!topology) topology = found;
+    GlbLevel plain = plain_level(share, level, parameters, found);
+    plain.put_arrays = [&parameters, &level, distances_of, quiet](const Sink& to) {
+      put_plain(level, parameters, distances_of(level).values.span(), quiet, to);
+    };
+    return plain;
+  };
+  GlbPart part = {.name = "surface", .material = "neutral"};
+  part.add_level(level_of(1, mesh, LevelProgress(context, parameters, 0).encode));
+  mesh::Mesh coarse;
+  if (!shares.empty()) coarse = copy_of(mesh);
+  for (std::size_t n = 0; n < shares.size(); ++n) {
+    const LevelProgress progress(context, parameters, n + 1);
+    coarsen(count_of(shares[n], mesh), progress.simplify, coarse);
+    if (!is_plain(parameters)) kept.clear();
+    part.add_level(level_of(shares[n], kept.emplace_back(copy_of(coarse)), progress.encode));
+  }
+  write_glb({&part, 1}, grid, content.provenance, writing(context, parameters), sink);
+  if (is_plain(parameters)) return topology;
+  if (part.levels.empty() || part.levels.front().streams.empty()) return std::nullopt;
+  return topology_of(mesh, part.levels.front().streams, quiet);
 }
 
 }  // namespace
 
 std::optional<mesh::Topology> encode_glb(const FileContent& content, const mesh::Context& context,
                                          const Sink& sink) {
-  if (content.labels != nullptr) {
-    encode_labels(*content.labels, content.provenance, context, sink);
-    return std::nullopt;
-  }
-  const mesh::Mesh& mesh = content.mesh;
-  const MeshParameters& parameters = content.provenance.parameters;
-  const auto shares = coarser_shares(parameters);
-  const auto level_of = [&](double share, const mesh::Mesh& level, const Grid& grid,
-                            const mesh::Context& progress) {
-    const Distances distances(level, parameters, content.extracted, progress);
-    return encode_level(share, level, distances, grid, parameters, progress);
-  };
-  const Grid grid = grid_of(mesh, parameters.draco.position_bits);
-  GlbPart part = {.name = "surface", .material = "neutral"};
-  const LevelProgress finest(context, 0, shares.size() + 1);
-  part.add_level(level_of(1, mesh, grid, finest.encode));
-  mesh::Mesh coarse;
-  if (!shares.empty()) coarse = copy_of(mesh);
-  for (std::size_t n = 0; n < shares.size(); ++n) {
-    const LevelProgress progress(context, n + 1, shares.size() + 1);
-    coarsen(count_of(shares[n], mesh), progress.simplify, coarse);
-    part.add_level(level_of(shares[n], coarse, grid, progress.encode));
-  }
-  write_glb({&part, 1}, grid, content.provenance, sink);
-  if (part.levels.empty() || part.levels.front().streams.empty()) return std::nullopt;
-  return topology_of(mesh, part.levels.front().streams, {context.stop, nullptr});
+  if (content.labels == nullptr) return encode_surface(content, context, sink);
+  encode_labels(*content.labels, content.provenance, context, sink);
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

@@ -15,11 +15,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
-constexpr const char* kMeshoptExtension = "EXT_meshopt_compression";
 constexpr const char* kQuantizationExtension = "KHR_mesh_quantization";
 constexpr const char* kLodExtension = "MSFT_lod";
-// glTF requires the underscore for application-specific attributes.
-constexpr const char* kDistanceAttribute = "_DISTANCE_MM";
+constexpr const char* kManifoldExtension = "EXT_mesh_manifold";
 // glTF 2.0, sections 3.4 and 3.6.2.
 constexpr int kByte = 5120;
 constexpr int kUnsignedShort = 5123;
@@ -27,6 +25,28 @@ constexpr int kUnsignedInt = 5125;
 constexpr int kFloat = 5126;
 constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
+
+// The extension that compresses arrays; null if they are raw.
+const char* meshopt_extension(GlbCodec codec) {
+  if (codec == GlbCodec::kMeshopt) return "EXT_meshopt_compression";
+  return codec == GlbCodec::kKhrMeshopt ? "KHR_meshopt_compression" : nullptr;
+}
+
+// The extensions that readers must support.
+std::vector<const char*> required_extensions(GlbCodec codec) {
+  switch (codec) {
+    case GlbCodec::kDraco:
+      return {kDracoExtension};
+    case GlbCodec::kMeshopt:
+    case GlbCodec::kKhrMeshopt:
+      return {meshopt_extension(codec), kQuantizationExtension};
+    case GlbCodec::kQuantized:
+      return {kQuantizationExtension};
+    case GlbCodec::kNone:
+      break;
+  }
+  return {};
+}
 
 // Adds a primitive to the last mesh, with its accessors and its buffer view.
 void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
@@ -38,8 +58,8 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
   gltf["accessors"].push_back({{"componentType", kFloat},
                                {"count", chunk.vertices},
                                {"type", "VEC3"},
-                               {"min", chunk.low},
-                               {"max", chunk.high}});
+                               {"min", chunk.bounds.low},
+                               {"max", chunk.bounds.high}});
   gltf["accessors"].push_back({{"componentType", kUnsignedInt},
                                {"count", std::size_t{chunk.triangles} * 3},
                                {"type", "SCALAR"}});
@@ -60,58 +80,62 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
        {"extensions", {{kDracoExtension, {{"bufferView", view}, {"attributes", attributes}}}}}});
 }
 
-// Adds one array of the last chunk as a buffer view and returns its index. The view lies in the
-// second buffer, which has no data; readers decompress it from the first.
-std::size_t add_view(Json& gltf, const MeshoptArray& array, std::size_t offset) {
-  const bool is_indices = array.kind == MeshoptArray::Kind::kIndices;
-  const std::size_t bytes = array.count * array.stride;
-  Json& unpacked = gltf["buffers"][1]["byteLength"];
-  const auto begin = unpacked.get<std::size_t>();
-  unpacked = begin + glb_padded(bytes);
-  Json packed = {{"buffer", 0},
-                 {"byteOffset", offset + array.begin},
-                 {"byteLength", array.bytes},
-                 {"byteStride", array.stride},
-                 {"count", array.count},
-                 {"mode", is_indices ? "TRIANGLES" : "ATTRIBUTES"}};
-  if (array.kind == MeshoptArray::Kind::kNormals) packed["filter"] = "OCTAHEDRAL";
-  Json view = {{"buffer", 1}, {"byteOffset", begin}, {"byteLength", bytes}};
+// Adds one array of the last chunk as a buffer view and returns its index. A view of a compressed
+// array lies in the second buffer, which has no data; readers decompress it from the first.
+std::size_t add_view(Json& gltf, const GlbArray& array, std::size_t offset, GlbCodec codec) {
+  const bool is_indices = array.kind == GlbArray::Kind::kIndices;
+  const char* const extension = meshopt_extension(codec);
+  Json view = {{"buffer", 0}, {"byteOffset", offset + array.begin}, {"byteLength", array.bytes}};
+  Json packed;
+  if (extension != nullptr) {
+    packed = view;
+    packed["byteStride"] = array.stride;
+    packed["count"] = array.count;
+    packed["mode"] = is_indices ? "TRIANGLES" : "ATTRIBUTES";
+    if (array.kind == GlbArray::Kind::kNormals) packed["filter"] = "OCTAHEDRAL";
+    const std::size_t bytes = array.count * array.stride;
+    Json& unpacked = gltf["buffers"][1]["byteLength"];
+    const auto begin = unpacked.get<std::size_t>();
+    unpacked = begin + glb_padded(bytes);
+    view = {{"buffer", 1}, {"byteOffset", begin}, {"byteLength", bytes}};
+  }
   if (!is_indices) view["byteStride"] = array.stride;
   view["target"] = is_indices ? kElementArrayBuffer : kArrayBuffer;
-  view["extensions"] = {{kMeshoptExtension, packed}};
+  if (extension != nullptr) view["extensions"] = {{extension, packed}};
   gltf["bufferViews"].push_back(std::move(view));
   return gltf["bufferViews"].size() - 1;
 }
 
-void add_primitive(Json& gltf, const MeshoptChunk& chunk, std::size_t offset) {
+void add_primitive(Json& gltf, const ArrayChunk& chunk, std::size_t offset, GlbCodec codec) {
   Json attributes = Json::object();
   std::size_t indices = 0;
-  for (const MeshoptArray& array : chunk.arrays) {
+  for (const GlbArray& array : chunk.arrays) {
     const std::size_t number = gltf["accessors"].size();
-    Json accessor = {{"bufferView", add_view(gltf, array, offset)}};
+    Json accessor = {{"bufferView", add_view(gltf, array, offset, codec)}};
     const auto describe = [&](int type, const char* shape) {
       accessor["componentType"] = type;
       accessor["count"] = array.count;
       accessor["type"] = shape;
     };
+    const bool is_vector_of_floats = array.stride == sizeof(mesh::Vec3);
     switch (array.kind) {
-      case MeshoptArray::Kind::kPositions:
-        describe(array.stride == sizeof(mesh::Vec3) ? kFloat : kUnsignedShort, "VEC3");
-        accessor["min"] = chunk.low;
-        accessor["max"] = chunk.high;
+      case GlbArray::Kind::kPositions:
+        describe(is_vector_of_floats ? kFloat : kUnsignedShort, "VEC3");
+        accessor["min"] = chunk.bounds.low;
+        accessor["max"] = chunk.bounds.high;
         attributes["POSITION"] = number;
         break;
-      case MeshoptArray::Kind::kNormals:
-        describe(kByte, "VEC3");
-        accessor["normalized"] = true;
+      case GlbArray::Kind::kNormals:
+        describe(is_vector_of_floats ? kFloat : kByte, "VEC3");
+        if (!is_vector_of_floats) accessor["normalized"] = true;
         attributes["NORMAL"] = number;
         break;
-      case MeshoptArray::Kind::kDistances:
+      case GlbArray::Kind::kDistances:
         describe(kFloat, "SCALAR");
         attributes[kDistanceAttribute] = number;
         break;
-      case MeshoptArray::Kind::kIndices:
-        describe(kUnsignedInt, "SCALAR");
+      case GlbArray::Kind::kIndices:
+        describe(array.stride == sizeof(std::uint16_t) ? kUnsignedShort : kUnsignedInt, "SCALAR");
         indices = number;
         break;
     }
@@ -120,6 +144,17 @@ void add_primitive(Json& gltf, const MeshoptChunk& chunk, std::size_t offset) {
   gltf["meshes"].back()["primitives"].push_back({{"attributes", attributes},
                                                  {"indices", indices},
                                                  {"material", gltf["materials"].size() - 1}});
+}
+
+// Says of the last mesh that its only primitive is an oriented manifold without a boundary.
+void mark_as_solid(Json& gltf) {
+  constexpr int kTriangles = 4;
+  Json& mesh = gltf["meshes"].back();
+  const Json& primitive = mesh["primitives"][0];
+  const Json solid = {{"attributes", {{"POSITION", primitive["attributes"]["POSITION"]}}},
+                      {"indices", primitive["indices"]},
+                      {"mode", kTriangles}};
+  mesh["extensions"] = {{kManifoldExtension, {{"manifoldPrimitive", solid}}}};
 }
 
 Json asset_of(const Provenance& provenance) {
@@ -141,7 +176,8 @@ Json turned_node(const std::string& name) {
 class Steps {
  public:
   Steps(const Grid& grid, const MeshParameters& parameters)
-      : are_used_(parameters.glb_codec == GlbCodec::kMeshopt && is_on_steps(grid)),
+      : are_used_(parameters.glb_codec != GlbCodec::kDraco &&
+                  parameters.glb_codec != GlbCodec::kNone && is_on_steps(grid)),
         low_{grid.low[0], grid.low[1], grid.low[2]},
         step_(double{grid.side} / (std::exp2(grid.bits) - 1)) {}
 
@@ -185,10 +221,11 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
     add_primitive(gltf, chunk, offset, parameters);
     offset += glb_padded(chunk.bytes.size());
   }
-  for (const MeshoptChunk& chunk : level.arrays) {
-    add_primitive(gltf, chunk, offset);
-    offset += glb_padded(chunk.bytes.size());
+  for (const ArrayChunk& chunk : level.arrays) {
+    add_primitive(gltf, chunk, offset, parameters.glb_codec);
+    offset += chunk.size();
   }
+  if (level.is_solid) mark_as_solid(gltf);
 }
 
 Json extras_of(const LabelSummary& label) {
@@ -253,7 +290,36 @@ class Nodes {
   std::vector<Json> levels_;
 };
 
+// Lists the extensions of the file, and adds the buffer that compressed arrays are unpacked to.
+void add_extensions(Json& gltf, const GlbLayout& layout, GlbCodec codec) {
+  const std::vector<const char*> required = required_extensions(codec);
+  if (!required.empty()) {
+    gltf["extensionsUsed"] = required;
+    gltf["extensionsRequired"] = required;
+  }
+  if (std::ranges::any_of(layout.order(), &GlbLevel::is_solid)) {
+    gltf["extensionsUsed"].push_back(kManifoldExtension);
+  }
+  if (const char* const extension = meshopt_extension(codec)) {
+    gltf["buffers"].push_back(
+        {{"byteLength", 0}, {"extensions", {{extension, {{"fallback", true}}}}}});
+  }
+}
+
 }  // namespace
+
+void GlbLevel::put(const Sink& sink) const {
+  constexpr std::array<std::byte, kGlbAlignment> kZeros = {};
+  for (const DracoStream& stream : streams) {
+    const std::size_t bytes = stream.bytes.size();
+    sink(stream.bytes);
+    sink(std::span(kZeros).first(glb_padded(bytes) - bytes));
+  }
+  for (const ArrayChunk& chunk : arrays) {
+    if (!chunk.bytes.empty()) sink(chunk.bytes);
+  }
+  if (put_arrays) put_arrays(sink);
+}
 
 GlbLayout::GlbLayout(std::span<const GlbPart> parts) : begins_(parts.size()) {
   std::size_t most_levels = 0;
@@ -266,15 +332,13 @@ GlbLayout::GlbLayout(std::span<const GlbPart> parts) : begins_(parts.size()) {
       if (level >= parts[p].levels.size()) continue;
       begins_[p][level] = bytes_;
       order_.push_back(&parts[p].levels[level]);
-      order_.back()->for_each_chunk(
-          [&](std::span<const std::byte> bytes) { bytes_ += glb_padded(bytes.size()); });
+      bytes_ += order_.back()->bytes();
     }
   }
 }
 
 std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
                          const Provenance& provenance) {
-  const bool is_draco = provenance.parameters.glb_codec == GlbCodec::kDraco;
   const Steps steps(grid, provenance.parameters);
   Json gltf;
   gltf["asset"] = asset_of(provenance);
@@ -285,15 +349,7 @@ std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout
       gltf[list] = Json::array();
     }
     gltf["buffers"] = Json::array({{{"byteLength", layout.bytes()}}});
-    Json extensions = Json::array({is_draco ? kDracoExtension : kMeshoptExtension});
-    if (!is_draco) {
-      extensions.push_back(kQuantizationExtension);
-      // A buffer without data.
-      gltf["buffers"].push_back(
-          {{"byteLength", 0}, {"extensions", {{kMeshoptExtension, {{"fallback", true}}}}}});
-    }
-    gltf["extensionsUsed"] = extensions;
-    gltf["extensionsRequired"] = extensions;
+    add_extensions(gltf, layout, provenance.parameters.glb_codec);
   }
   Nodes nodes(gltf, layout, provenance.parameters);
   Json all = Json::array();

@@ -3,44 +3,43 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "server/codec/array_chunk.h"
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
-#include "server/codec/label_titles.h"
-#include "server/codec/meshopt_chunk.h"
 
 namespace isomesh::codec {
 
-// Alignment of chunks and buffer views, in bytes.
-inline constexpr std::size_t kGlbAlignment = 4;
-
-constexpr std::size_t glb_padded(std::size_t bytes) {
-  return (bytes + kGlbAlignment - 1) / kGlbAlignment * kGlbAlignment;
-}
-
-// A surface with about `share` of its triangles, as Draco or as meshopt chunks.
+// A surface with about `share` of its triangles, as Draco streams or as arrays.
 struct GlbLevel {
   double share = 1;
   std::vector<DracoStream> streams = {};
-  std::vector<MeshoptChunk> arrays = {};
+  std::vector<ArrayChunk> arrays = {};
+  bool is_solid = false;  // the only chunk is closed, manifold and oriented
+  // Writes the arrays if they have no bytes.
+  std::function<void(const Sink&)> put_arrays = {};
 
   std::uint64_t triangles() const {
     std::uint64_t triangles = 0;
     for (const DracoStream& stream : streams) triangles += stream.triangles;
-    for (const MeshoptChunk& chunk : arrays) triangles += chunk.triangles;
+    for (const ArrayChunk& chunk : arrays) triangles += chunk.triangles;
     return triangles;
   }
 
-  template <class Visit>
-  void for_each_chunk(const Visit& visit) const {
-    for (const DracoStream& stream : streams) visit(std::span(stream.bytes));
-    for (const MeshoptChunk& chunk : arrays) visit(std::span(chunk.bytes));
+  std::size_t bytes() const {
+    std::size_t bytes = 0;
+    for (const DracoStream& stream : streams) bytes += glb_padded(stream.bytes.size());
+    for (const ArrayChunk& chunk : arrays) bytes += chunk.size();
+    return bytes;
   }
+
+  void put(const Sink& sink) const;
 };
 
 // One surface with its own material and node.
@@ -81,7 +80,8 @@ class GlbLayout {
 
 // glTF's document of one surface, which is the root node's own, or of one surface per label, in
 // child nodes. Coarser levels are nodes after all others, referred to by MSFT_lod. If the chunks'
-// positions are grid steps, the nodes with meshes transform them to LPS millimetres.
+// positions are grid steps, the nodes with meshes transform them to LPS millimetres. A solid level
+// has EXT_mesh_manifold.
 std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
                          const Provenance& provenance);
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <draco/compression/encode.h>
@@ -39,6 +40,13 @@ std::uint32_t add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type ty
   // One write for all: the attribute's buffer has our arrays' layout.
   if (!values.empty()) attribute->buffer()->Write(0, values.data(), values.size_bytes());
   return attribute->unique_id();
+}
+
+// Names an attribute in the stream's metadata, where readers look for names of generic attributes.
+void name_attribute(draco::Mesh& mesh, std::uint32_t unique_id, const char* name) {
+  auto metadata = std::make_unique<draco::AttributeMetadata>();
+  metadata->AddEntryString("name", name);
+  mesh.AddAttributeMetadata(mesh.GetAttributeIdByUniqueId(unique_id), std::move(metadata));
 }
 
 // Built from arrays: Draco's soup builder would search for duplicates again.
@@ -113,6 +121,7 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
   if (!data.distances.empty()) {
     stream.distance_id =
         add_attribute(*draco_mesh, draco::GeometryAttribute::GENERIC, data.distances);
+    name_attribute(*draco_mesh, stream.distance_id, kDistanceAttribute);
     // All streams share one scale, so a seam vertex has the same number on both sides.
     const float nearest = 0;
     quantise(encoder, draco::GeometryAttribute::GENERIC, {&nearest, 1},

@@ -30,11 +30,14 @@ std::vector<Encoding> encodings() {
       {"drc", MeshFormat::kDrc},         {"drc, sequential", MeshFormat::kDrc},
       {"glb", MeshFormat::kGlb},         {"glb without normals", MeshFormat::kGlb},
       {"glb, merged", MeshFormat::kGlb}, {"glb, meshopt", MeshFormat::kGlb},
+      {"glb, none", MeshFormat::kGlb},   {"glb, quantized", MeshFormat::kGlb},
       {"stl", MeshFormat::kStl}};
   all[1].parameters.draco.speed = kSequentialSpeed;
   all[3].parameters.normals = false;
   all[4].parameters.merge = true;
   all[5].parameters.glb_codec = GlbCodec::kMeshopt;
+  all[6].parameters.glb_codec = GlbCodec::kNone;
+  all[7].parameters.glb_codec = GlbCodec::kQuantized;
   return all;
 }
 

@@ -13,8 +13,7 @@ using Bytes = std::span<const std::byte>;
 
 // With libdraco.
 DecodedSurface decode_drc(Bytes file, const mesh::Context& context);
-// With libdraco, packed glb with meshoptimizer: the finest level of the default scene, its blocks
-// joined.
+// With libdraco and meshoptimizer: the finest level of the default scene, its blocks joined.
 DecodedSurface decode_glb(Bytes file, const mesh::Context& context);
 
 // Throws Error kInternal unless all positions are finite and all vertex indices valid; kCancelled.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
 #include <set>
 
 #include <meshoptimizer.h>
@@ -96,17 +97,19 @@ Matrix transformation_of(const Json& node) {
   return matrix;
 }
 
-struct Packed {
+// An array as it is stored.
+struct Array {
   Bytes bytes;
-  std::size_t stride = 0;
+  std::size_t stride = 0;  // of an element that is not compressed
   std::size_t count = 0;
+  bool is_packed = false;  // by meshoptimizer
 };
 
 struct Primitive {
   Bytes stream;  // of Draco; empty if the arrays are uncompressed
   int position_id = 0;
-  Packed positions;
-  Packed indices;
+  Array positions;
+  Array indices;
   Matrix to_patient = kIdentity;
   std::size_t vertices = 0;
   std::size_t triangles = 0;
@@ -166,14 +169,26 @@ class Scene {
     return gltf_.at("accessors").at(number.get<std::size_t>());
   }
 
-  Packed packed_of(const Json& number, std::string_view mode) const {
-    const Json& view =
-        gltf_.at("bufferViews").at(accessor(number).at("bufferView").get<std::size_t>());
-    const Json& packed = view.at("extensions").at("EXT_meshopt_compression");
+  Array array_of(const Json& number, std::string_view mode) const {
+    const Json& described = accessor(number);
+    const Json& view = gltf_.at("bufferViews").at(described.at("bufferView").get<std::size_t>());
+    if (!view.contains("extensions")) {
+      constexpr int kUnsignedShort = 5123;
+      const bool is_narrow = described.at("componentType") == kUnsignedShort;
+      const std::size_t index = is_narrow ? sizeof(std::uint16_t) : sizeof(std::uint32_t);
+      return {.bytes = binary_at(view),
+              .stride = view.value("byteStride", index),
+              .count = described.at("count").get<std::size_t>()};
+    }
+    const Json& extensions = view["extensions"];
+    const Json& packed = extensions.contains("KHR_meshopt_compression")
+                             ? extensions["KHR_meshopt_compression"]
+                             : extensions.at("EXT_meshopt_compression");
     if (packed.at("mode") != mode) refuse_glb("an array has another compression mode");
     return {.bytes = binary_at(packed),
             .stride = packed.at("byteStride").get<std::size_t>(),
-            .count = packed.at("count").get<std::size_t>()};
+            .count = packed.at("count").get<std::size_t>(),
+            .is_packed = true};
   }
 
   Primitive primitive_of(const Json& json) const {
@@ -185,8 +200,8 @@ class Scene {
     primitive.vertices = count_of(position);
     primitive.triangles = count_of(json.at("indices")) / 3;
     if (!json.contains("extensions")) {
-      primitive.positions = packed_of(position, "ATTRIBUTES");
-      primitive.indices = packed_of(json.at("indices"), "TRIANGLES");
+      primitive.positions = array_of(position, "ATTRIBUTES");
+      primitive.indices = array_of(json.at("indices"), "TRIANGLES");
       return primitive;
     }
     const Json& draco = json.at("extensions").at("KHR_draco_mesh_compression");
@@ -230,41 +245,65 @@ void place(const std::vector<Position>& stored, const Matrix& matrix, DecodedSur
 
 template <class Position>
 void unpack_positions(const Primitive& primitive, DecodedSurface& surface) {
-  const auto& [bytes, stride, count] = primitive.positions;
-  std::vector<Position> stored(count);
-  if (meshopt_decodeVertexBuffer(stored.data(), count, stride,
-                                 reinterpret_cast<const unsigned char*>(bytes.data()),
-                                 bytes.size()) != 0) {
+  const Array& array = primitive.positions;
+  std::vector<Position> stored(array.count);
+  if (!array.is_packed) {
+    if (!stored.empty()) std::memcpy(stored.data(), array.bytes.data(), array.bytes.size());
+  } else if (meshopt_decodeVertexBuffer(stored.data(), array.count, array.stride,
+                                        reinterpret_cast<const unsigned char*>(array.bytes.data()),
+                                        array.bytes.size()) != 0) {
     refuse_glb("meshoptimizer cannot decode its positions");
   }
   place(stored, primitive.to_patient, surface);
 }
 
+void unpack_indices(const Array& array, mesh::Buffer<mesh::Triangle>& triangles) {
+  if (triangles.size() == 0) return;
+  if (array.stride == sizeof(std::uint16_t)) {
+    const auto index = [&](std::size_t number) {
+      std::uint16_t value = 0;
+      std::memcpy(&value, array.bytes.data() + number * sizeof value, sizeof value);
+      return std::uint32_t{value};
+    };
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      triangles[t] = {index(3 * t), index(3 * t + 1), index(3 * t + 2)};
+    }
+  } else if (!array.is_packed) {
+    std::memcpy(triangles.data(), array.bytes.data(), array.bytes.size());
+  } else if (meshopt_decodeIndexBuffer(triangles.data(), array.count, array.stride,
+                                       reinterpret_cast<const unsigned char*>(array.bytes.data()),
+                                       array.bytes.size()) != 0) {
+    refuse_glb("meshoptimizer cannot decode its triangles");
+  }
+}
+
+// True if the array has so many elements of one of these sizes, and about as many bytes as they
+// need.
+bool holds(const Array& array, std::size_t count, std::initializer_list<std::size_t> strides) {
+  constexpr std::size_t kMostPerByte = 4096;  // far above the codec's best compression
+  return array.count == count && std::ranges::find(strides, array.stride) != strides.end() &&
+         (array.is_packed ? count / kMostPerByte <= array.bytes.size()
+                          : array.bytes.size() / array.stride == count &&
+                                array.bytes.size() % array.stride == 0);
+}
+
 DecodedSurface unpack(const Primitive& primitive) {
   using Steps = std::array<std::uint16_t, 4>;
-  const std::size_t stride = primitive.positions.stride;
-  constexpr std::size_t kMostPerByte = 4096;  // far above the codec's best compression
-  if (primitive.positions.count != primitive.vertices ||
-      primitive.indices.count != 3 * primitive.triangles || primitive.indices.stride != 4 ||
-      (stride != sizeof(Steps) && stride != sizeof(mesh::Vec3)) ||
-      primitive.vertices / kMostPerByte > primitive.positions.bytes.size() ||
-      primitive.triangles / kMostPerByte > primitive.indices.bytes.size()) {
+  const Array& positions = primitive.positions;
+  const Array& indices = primitive.indices;
+  if (!holds(positions, primitive.vertices, {sizeof(Steps), sizeof(mesh::Vec3)}) ||
+      !holds(indices, 3 * primitive.triangles, {sizeof(std::uint16_t), sizeof(std::uint32_t)}) ||
+      (indices.is_packed && indices.stride != sizeof(std::uint32_t))) {
     refuse_glb("a block's accessors do not match its content");
   }
   DecodedSurface surface;
-  if (stride == sizeof(Steps)) {
+  if (positions.stride == sizeof(Steps)) {
     unpack_positions<Steps>(primitive, surface);
   } else {
     unpack_positions<mesh::Vec3>(primitive, surface);
   }
   surface.triangles.resize_for_overwrite(primitive.triangles);
-  const Bytes indices = primitive.indices.bytes;
-  if (primitive.triangles > 0 &&
-      meshopt_decodeIndexBuffer(
-          surface.triangles.data(), primitive.indices.count, sizeof(std::uint32_t),
-          reinterpret_cast<const unsigned char*>(indices.data()), indices.size()) != 0) {
-    refuse_glb("meshoptimizer cannot decode its triangles");
-  }
+  unpack_indices(indices, surface.triangles);
   return surface;
 }
 

@@ -60,7 +60,7 @@ std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParam
   for (const MeshFormat format : files_of(parameters)) {
     const codec::Format& row = codec::describe(format);
     const double guess = row.bytes(surface, parameters);
-    bytes += row.has_exact_bytes ? guess : guess / 2;
+    bytes += row.has_exact_bytes(parameters) ? guess : guess / 2;
   }
   return static_cast<std::uint64_t>(bytes);
 }

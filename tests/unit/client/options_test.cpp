@@ -319,6 +319,42 @@ TEST_F(OptionsTest, TextsAreUtf8) {
   EXPECT_EQ(options_from({"upload", latin}).files.front(), latin);
 }
 
+TEST_F(OptionsTest, AGlbThatIsSavedHasNoCodecUnlessOneIsNamed) {
+  const auto codec_of = [](const Words& words) { return options_from(words).parameters.glb_codec; };
+  EXPECT_EQ(codec_of(mesh({})), GlbCodec::kNone);
+  EXPECT_EQ(codec_of(mesh({"-o", folder_ / "head.stl"})), GlbCodec::kNone);
+  EXPECT_EQ(codec_of({"local", file_, "--iso", "1", "-o", folder_ / "head.glb"}), GlbCodec::kNone);
+  EXPECT_EQ(
+      codec_of({"mesh", file_, "--iso", "1", "-o", folder_.path().string(), "--format", "stl,glb"}),
+      GlbCodec::kNone);
+  EXPECT_EQ(codec_of({"mesh", file_, "--iso", "1", "--dry-run", "--format", "glb"}),
+            GlbCodec::kNone);
+  for (const GlbCodec codec : values_of<GlbCodec>()) {
+    EXPECT_EQ(codec_of(mesh({"--glb-codec", std::string(to_string(codec))})), codec);
+  }
+}
+
+// Jobs without a GLB can share their meshes with those of other clients; those of `submit` are for
+// any of them.
+TEST_F(OptionsTest, OtherJobsHaveTheCodecOfTheApi) {
+  for (const std::string command : {"submit", "estimate"}) {
+    EXPECT_EQ(options_from({command, "abc", "--iso", "1", "--format", "glb"}).parameters.glb_codec,
+              MeshParameters{}.glb_codec);
+  }
+  EXPECT_EQ(options_from(mesh({}, ".stl")).parameters.glb_codec, MeshParameters{}.glb_codec);
+  EXPECT_EQ(options_from(mesh({"--glb-codec", "meshopt"}, ".stl")).parameters.glb_codec,
+            GlbCodec::kMeshopt);
+}
+
+TEST_F(OptionsTest, HelpTellsTheCodecOfASavedGlb) {
+  for (const std::string command : {"mesh", "local"}) {
+    const auto [status, text] = end_of({command, "--help"});
+    EXPECT_EQ(status, 0);
+    EXPECT_THAT(text, HasSubstr("quantized; default: none)")) << command;
+  }
+  EXPECT_THAT(end_of({"submit", "--help"}).second, HasSubstr("quantized; default: draco)"));
+}
+
 TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {
   const std::string glb = (folder_ / "body.glb").string();
   const Options options =

@@ -136,6 +136,7 @@ std::vector<std::array<mesh::Vec3, 3>> read_exactly(const std::string& bytes, Me
   switch (format) {
     case MeshFormat::kStl:
     case MeshFormat::kPly:
+    case MeshFormat::kGlb:
       return read_with_assimp(bytes, std::string(to_string(format)));
     case MeshFormat::kObj:
     case MeshFormat::kOff: {

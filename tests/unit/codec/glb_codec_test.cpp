@@ -45,30 +45,44 @@ test::DecodedMesh read_back(const std::string& glb) {
                         {surface.triangles.begin(), surface.triangles.end()}}});
 }
 
-TEST(MeshoptGlb, IsTheSameSurfaceForMeshoptimizersOwnDecoder) {
+// The codecs of arrays on the same grid as Draco's.
+class ArrayGlb : public testing::TestWithParam<GlbCodec> {
+ protected:
+  static std::string glb_of(const mesh::Mesh& mesh, int bits = DracoParameters{}.position_bits) {
+    return encoded(mesh, MeshFormat::kGlb, with_codec(GetParam(), bits));
+  }
+};
+
+TEST_P(ArrayGlb, IsTheSameSurfaceForReadersThatAreNotOurs) {
+  std::vector<std::string> extensions = {"KHR_mesh_quantization"};
+  if (GetParam() == GlbCodec::kMeshopt)
+    extensions.insert(extensions.begin(), "EXT_meshopt_compression");
+  if (GetParam() == GlbCodec::kKhrMeshopt)
+    extensions.insert(extensions.begin(), "KHR_meshopt_compression");
   for (const auto& [name, mesh] : test::meshes_to_encode()) {
     if (name.starts_with("flat") || name == "oblique") continue;  // node takes its time to start
     SCOPED_TRACE(name);
-    const std::string glb = encoded(mesh, MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt));
-    EXPECT_EQ(test::open_container(glb).document["extensionsRequired"],
-              nlohmann::json({"EXT_meshopt_compression", "KHR_mesh_quantization"}));
+    const std::string glb = glb_of(mesh);
+    const nlohmann::json document = test::open_container(glb).document;
+    EXPECT_EQ(document["extensionsRequired"], nlohmann::json(extensions));
+    EXPECT_EQ(document["extensionsUsed"], document["extensionsRequired"]);
     test::expect_same_mesh(whole(test::read_with_node(glb)), mesh, DracoParameters{}.position_bits);
     test::expect_same_mesh(read_back(glb), mesh, DracoParameters{}.position_bits);
   }
 }
 
-TEST(MeshoptGlb, OfSeveralBlocksHasTheSamePlacesOnBothSidesOfASeam) {
+TEST_P(ArrayGlb, OfSeveralBlocksHasTheSamePlacesOnBothSidesOfASeam) {
   const mesh::Mesh mesh = test::several_blocks();
-  const std::string glb = encoded(mesh, MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt, 16));
+  const std::string glb = glb_of(mesh, 16);
   const auto primitives = test::read_with_node(glb);
   ASSERT_GT(primitives.size(), 2U);
   EXPECT_EQ(whole(primitives).points.size(), mesh.positions.size());
   test::expect_same_mesh(read_back(glb), mesh, 16);
 }
 
-TEST(MeshoptGlb, KeepsCoordinatesOfMoreThan16BitsAsTheyAre) {
+TEST_P(ArrayGlb, KeepsCoordinatesOfMoreThan16BitsAsTheyAre) {
   const mesh::Mesh mesh = std::move(test::meshes_to_encode().at(3).mesh);
-  const std::string glb = encoded(mesh, MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt, 17));
+  const std::string glb = glb_of(mesh, 17);
   const test::DecodedMesh read = read_back(glb);
   std::vector<Vec3> expected(mesh.positions.begin(), mesh.positions.end());
   std::vector<Vec3> found = read.points;
@@ -78,14 +92,49 @@ TEST(MeshoptGlb, KeepsCoordinatesOfMoreThan16BitsAsTheyAre) {
   EXPECT_EQ(whole(test::read_with_node(glb)).triangles.size(), mesh.triangles.size());
 }
 
-TEST(MeshoptGlb, IsTheSameOnAnyNumberOfThreads) {
-  test::expect_same_on_any_threads(
-      [] { return encoded(test::large_mesh(), MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt)); });
+TEST_P(ArrayGlb, IsTheSameOnAnyNumberOfThreads) {
+  test::expect_same_on_any_threads([] { return glb_of(test::large_mesh()); });
 }
 
-TEST(MeshoptGlb, OfNothingIsAFileWithoutAMesh) {
-  const std::string glb = encoded(mesh::Mesh{}, MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt));
-  EXPECT_TRUE(test::read_with_node(glb).empty());
+TEST_P(ArrayGlb, OfNothingIsAFileWithoutAMesh) {
+  EXPECT_TRUE(test::read_with_node(glb_of(mesh::Mesh{})).empty());
+}
+
+std::string name_of_codec(const testing::TestParamInfo<GlbCodec>& test) {
+  std::string name(to_string(test.param));
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Codecs, ArrayGlb,
+                         testing::Values(GlbCodec::kMeshopt, GlbCodec::kKhrMeshopt,
+                                         GlbCodec::kQuantized),
+                         name_of_codec);
+
+TEST(KhrMeshoptGlb, HasTheStreamsOfTheOlderName) {
+  const mesh::Mesh mesh = test::several_blocks();
+  const auto binary_of = [&](GlbCodec codec) {
+    return test::open_container(encoded(mesh, MeshFormat::kGlb, with_codec(codec))).binary;
+  };
+  EXPECT_EQ(binary_of(GlbCodec::kMeshopt), binary_of(GlbCodec::kKhrMeshopt));
+}
+
+// Indices of 16 bits must not be the largest, which glTF reserves.
+TEST(QuantizedGlb, HasIndicesOf16BitsWhereTheySuffice) {
+  const mesh::Mesh mesh = test::several_blocks();
+  for (const bool merge : {false, true}) {
+    Provenance provenance = with_codec(GlbCodec::kQuantized);
+    provenance.parameters.merge = merge;
+    const nlohmann::json document =
+        test::open_container(encoded(mesh, MeshFormat::kGlb, provenance)).document;
+    for (const auto& primitive : document["meshes"][0]["primitives"]) {
+      const auto& indices = document["accessors"][primitive["indices"].get<std::size_t>()];
+      const auto& positions =
+          document["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
+      EXPECT_EQ(positions["count"] > 65535, merge);
+      EXPECT_EQ(indices["componentType"], merge ? 5125 : 5123);
+    }
+  }
 }
 
 // At each place the normal that was found there.
@@ -107,16 +156,14 @@ double degrees_between(const Vec3& a, const Vec3& b) {
   return std::acos(std::clamp(dot / lengths, -1.0, 1.0)) * 57.29577951308232;
 }
 
-TEST(MeshoptGlb, HasNormalsOfEightBits) {
+TEST_P(ArrayGlb, HasNormalsOfEightBits) {
   const mesh::Mesh mesh = std::move(test::meshes_to_encode().at(2).mesh);
   const auto draco = normals_in(
       test::read_with_node(encoded(mesh, MeshFormat::kGlb, with_codec(GlbCodec::kDraco, 20))));
-  Provenance provenance = with_codec(GlbCodec::kMeshopt, 20);
-  const auto meshopt =
-      normals_in(test::read_with_node(encoded(mesh, MeshFormat::kGlb, provenance)));
-  ASSERT_EQ(meshopt.size(), mesh.positions.size());
+  const auto arrays = normals_in(test::read_with_node(glb_of(mesh, 20)));
+  ASSERT_EQ(arrays.size(), mesh.positions.size());
   ASSERT_EQ(draco.size(), mesh.positions.size());
-  for (auto a = draco.begin(), b = meshopt.begin(); a != draco.end(); ++a, ++b) {
+  for (auto a = draco.begin(), b = arrays.begin(); a != draco.end(); ++a, ++b) {
     EXPECT_LT(degrees_between(a->second, b->second), 1.5);
   }
 }
@@ -158,13 +205,16 @@ TEST_P(MergedGlb, IsTheSameOnAnyNumberOfThreads) {
   test::expect_same_on_any_threads([&] { return encoded(mesh, MeshFormat::kGlb, provenance); });
 }
 
-INSTANTIATE_TEST_SUITE_P(Codecs, MergedGlb, testing::Values(GlbCodec::kDraco, GlbCodec::kMeshopt),
-                         [](const auto& test) { return std::string(to_string(test.param)); });
+INSTANTIATE_TEST_SUITE_P(Codecs, MergedGlb,
+                         testing::Values(GlbCodec::kDraco, GlbCodec::kMeshopt,
+                                         GlbCodec::kQuantized),
+                         name_of_codec);
 
-class MeshoptGlbOfLabels : public test::LabelFilesTest {};
+class ArrayGlbOfLabels : public test::LabelFilesTest,
+                         public testing::WithParamInterface<GlbCodec> {};
 
-TEST_F(MeshoptGlbOfLabels, SharesWallsAndHasCoarserLevels) {
-  provenance_.parameters.glb_codec = GlbCodec::kMeshopt;
+TEST_P(ArrayGlbOfLabels, SharesWallsAndHasCoarserLevels) {
+  provenance_.parameters.glb_codec = GetParam();
   provenance_.parameters.merge = true;
   const auto primitives = test::read_with_node(encoded(MeshFormat::kGlb));
   ASSERT_EQ(primitives.size(), kLabels);
@@ -177,6 +227,9 @@ TEST_F(MeshoptGlbOfLabels, SharesWallsAndHasCoarserLevels) {
   provenance_.parameters.lods = {1, 0.3};
   EXPECT_GT(test::read_with_node(encoded(MeshFormat::kGlb)).size(), kLabels);
 }
+
+INSTANTIATE_TEST_SUITE_P(Codecs, ArrayGlbOfLabels,
+                         testing::Values(GlbCodec::kMeshopt, GlbCodec::kQuantized), name_of_codec);
 
 }  // namespace
 }  // namespace isomesh::codec

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/json.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"

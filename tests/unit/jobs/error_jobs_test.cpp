@@ -326,6 +326,24 @@ TEST_F(ErrorJobsTest, OfLabelsMeasureDracoInTheZip) {
   EXPECT_LT(exact.found_mm, rounded.found_mm);
 }
 
+TEST_F(ErrorJobsTest, OfAGlbWithoutACodecAreThoseOfTheMesh) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.draco.position_bits = 8;  // so that rounding shows
+  parameters.certify = true;
+  const auto certified = [&](MeshFormat format, GlbCodec codec) {
+    parameters.formats = {format};
+    parameters.glb_codec = codec;
+    return *run(parameters).certificate;
+  };
+  const MeshCertificate exact = certified(MeshFormat::kStl, GlbCodec::kDraco);
+  const MeshCertificate plain = certified(MeshFormat::kGlb, GlbCodec::kNone);
+  EXPECT_EQ(plain.file, MeshFormat::kGlb);
+  EXPECT_EQ(plain.found_mm, exact.found_mm);
+  for (const GlbCodec codec : {GlbCodec::kDraco, GlbCodec::kKhrMeshopt, GlbCodec::kQuantized}) {
+    EXPECT_GT(certified(MeshFormat::kGlb, codec).found_mm, exact.found_mm) << to_string(codec);
+  }
+}
+
 TEST_F(ErrorJobsTest, AreCancelledAndRefusedAsOthersAre) {
   JobParameters parameters = parameters_of(volume_, 0);
   parameters.max_error_mm = 0.1;

@@ -50,8 +50,8 @@ TEST(CheckDisk, RejectsFilesThatCanNeverFit) {
   mesh.positions.resize_for_overwrite(500'000);
   mesh.triangles.resize_for_overwrite(1'000'000);
   const Volume volume;
+  MeshParameters parameters;
   const auto code_of = [&](MeshFormat format, std::uint64_t disk_bytes) {
-    MeshParameters parameters;
     parameters.formats = {format};
     return test::code_thrown_by([&] {
       check_disk(mesh, {.volume = volume,
@@ -71,6 +71,9 @@ TEST(CheckDisk, RejectsFilesThatCanNeverFit) {
   }
   // A guess of 39 MB.
   EXPECT_EQ(code_of(MeshFormat::kObj, 20'000'000), std::nullopt);
+  parameters.glb_codec = GlbCodec::kNone;
+  EXPECT_EQ(code_of(MeshFormat::kGlb, 24'000'000), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of(MeshFormat::kGlb, 24'004'000), std::nullopt);
 }
 
 TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {

@@ -30,7 +30,7 @@ TEST(Names, AreThoseOfTheContract) {
   expect_names<SampleType>(
       {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"});
   expect_names<Interpolation>({"linear", "midpoint"});
-  expect_names<GlbCodec>({"draco", "meshopt"});
+  expect_names<GlbCodec>({"draco", "none", "meshopt", "khr-meshopt", "quantized"});
   expect_names<Space>({"lps", "ras"});
   expect_names<Priority>({"stat", "routine", "bulk"});
   expect_names<JobState>({"queued", "running", "succeeded", "failed", "cancelled"});

@@ -38,6 +38,17 @@ describe('a surface that is loading', () => {
     for (const [drawn, total] of counts) expect(drawn).toBeLessThanOrEqual(total);
   });
 
+  it('is the same if its file is not compressed', async ({ page, daemon }) => {
+    await listen(page);
+    const volume = await daemon.upload(labelsNrrd(24));
+    const job = { volume, labels: 'all', formats: ['glb'], glb_codec: 'none', distances: true, lods: [1, 0.3] };
+    const { id, mesh } = await daemon.make(job);
+    await openSurface(at, id);
+    const all = (mesh?.labels ?? []).reduce((sum, { triangles }) => sum + triangles, 0);
+    const last = (await page.evaluate(() => window.said)).at(-1)?.replaceAll('\u202f', '');
+    expect(last).toBe(`${all} of ${all} triangles`);
+  });
+
   it('says so where it is measured', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });

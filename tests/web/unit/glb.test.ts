@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { GlbReader, type DracoPrimitive } from '@/mesh/glb';
+import { GlbReader, type Primitive } from '@/mesh/glb';
 
 // A GLB whose primitives hold these bytes, in this order.
 function glb(streams: number[][], change: (gltf: Record<string, unknown>) => void = () => undefined): Uint8Array {
@@ -40,6 +40,20 @@ function glb(streams: number[][], change: (gltf: Record<string, unknown>) => voi
   return file;
 }
 
+// A GLB of two vertices and one triangle as they are: positions, normals, distances and indices.
+function plainGlb(attributes: Record<string, number>, positions: object = {}): Uint8Array {
+  const arrays = [24, 24, 8, 12].map((bytes) => new Array<number>(bytes).fill(1));
+  return glb(arrays, (gltf) => {
+    gltf.accessors = [
+      { bufferView: 0, componentType: 5126, count: 2, type: 'VEC3', min: [0, 0, 0], max: [1, 2, 3], ...positions },
+      { bufferView: 1, componentType: 5126, count: 2, type: 'VEC3' },
+      { bufferView: 2, componentType: 5126, count: 2, type: 'SCALAR' },
+      { bufferView: 3, componentType: 5125, count: 3, type: 'SCALAR' },
+    ];
+    gltf.meshes = [{ primitives: [{ attributes, indices: 3 }] }];
+  });
+}
+
 function read(file: Uint8Array, pieceBytes: number): { streams: number[][]; at: number[]; complete: boolean } {
   const streams: number[][] = [];
   const at: number[] = [];
@@ -59,8 +73,8 @@ function read(file: Uint8Array, pieceBytes: number): { streams: number[][]; at: 
 }
 
 // All of it at once.
-function taken(file: Uint8Array): { found: DracoPrimitive[]; order: number[]; complete: boolean } {
-  const result = { found: [] as DracoPrimitive[], order: [] as number[] };
+function taken(file: Uint8Array): { found: Primitive[]; order: number[]; complete: boolean } {
+  const result = { found: [] as Primitive[], order: [] as number[] };
   const reader = new GlbReader({ onPrimitives: (parts) => (result.found = parts), onStream: (index) => result.order.push(index) });
   reader.take(file);
   return { ...result, complete: reader.isComplete };
@@ -142,6 +156,19 @@ describe('GlbReader', () => {
       }),
     );
     expect(found.map(({ distanceId }) => distanceId)).toEqual([null, 4, null]);
+  });
+
+  it('finds the arrays of a surface that is not compressed, which come together', () => {
+    const { found, order, complete } = taken(plainGlb({ POSITION: 0, NORMAL: 1, _DISTANCE_MM: 2 }));
+    expect(found).toMatchObject([{ offset: 0, length: 12 * 2 + 12 * 2 + 4 * 2 + 4 * 3, triangles: 1, vertices: 2, distanceId: null }]);
+    expect(found[0]?.arrays).toEqual({ positions: 0, distances: 48, index: 56, vertices: 2, corners: 3 });
+    expect([order, complete]).toEqual([[0], true]);
+    expect(taken(plainGlb({ POSITION: 0 })).found[0]?.arrays?.distances).toBeNull();
+  });
+
+  it('refuses arrays of other numbers than floats and 32-bit indices', () => {
+    expect(() => taken(plainGlb({ POSITION: 0 }, { componentType: 5123 }))).toThrow(/plain arrays/);
+    expect(() => taken(plainGlb({ POSITION: 0 }, { count: 3 }))).toThrow(/plain arrays/);
   });
 
   it('is not complete while bytes are missing', () => {

@@ -302,7 +302,7 @@ Normals = bool
 Distances = bool
 Lods = Union['Sequence[float]']
 Merge = bool
-GlbCodec = Literal['draco', 'meshopt']
+GlbCodec = Literal['draco', 'meshopt', 'khr-meshopt', 'quantized', 'none']
 Space = Literal['lps', 'ras']
 Priority = Literal['stat', 'routine', 'bulk']
 Certify = bool
@@ -491,8 +491,9 @@ class JobOptions(_Parameters, total=False):
 
     distances
         Write each vertex's distance to the extracted surface to glb, in millimetres. The vertex
-        attribute is _DISTANCE_MM; every level of detail has it. Values are rounded to a four
-        thousandth of the largest. The page shows them as colours. The formats must include glb.
+        attribute is _DISTANCE_MM; every level of detail has it. With the codec draco, values
+        are rounded to a four thousandth of the largest. The page shows them as colours. The
+        formats must include glb.
 
     lods
         Levels of detail in glb, as decreasing fractions of the triangles; the first is 1. At
@@ -502,12 +503,17 @@ class JobOptions(_Parameters, total=False):
     merge
         Write the surface to glb as one primitive; with labels, as one per label. For programs
         that take each primitive for a separate object. Otherwise there is one per hundred
-        thousand triangles or so; they are written and read in parallel.
+        thousand triangles or so; they are written and read in parallel. With the codec none,
+        there is always one.
 
     glb_codec
-        How the surface in glb is compressed. draco is KHR_draco_mesh_compression and makes
-        smaller files. meshopt is EXT_meshopt_compression and is read faster. Readers must
-        support the one that is used.
+        How the surface in glb is compressed. draco is KHR_draco_mesh_compression and makes the
+        smallest files. meshopt is EXT_meshopt_compression and is read faster; khr-meshopt is
+        the same under the newer name KHR_meshopt_compression. quantized is
+        KHR_mesh_quantization alone: small numbers that are not compressed. Readers must support
+        the one that is used. none needs no extension: floats that are not rounded, in one
+        primitive for each surface, whose size is about ten times that of draco. Every reader of
+        glTF opens it.
 
     space
         Directions of x and y in the files: to the patient's left and back, or to the right and

@@ -1,12 +1,15 @@
-// Decodes Draco streams beside the page and makes blocks of them.
+// Decodes Draco streams beside the page, or takes plain arrays, and makes blocks of them.
 import create, { type DracoAttribute, type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
 import wasmUrl from 'three/examples/jsm/libs/draco/gltf/draco_decoder.wasm?url';
 import { prepare, split, type Block, type Triangles } from './blocks';
+import type { PlainArrays } from './glb';
 import { buffersIn, type WorkerScope } from './transfer';
 
 export interface DecodeRequest {
   id: number;
   bytes: Uint8Array<ArrayBuffer>;
+  // Of bytes that are not compressed; the two numbers below are those of a Draco stream.
+  arrays: PlainArrays | undefined;
   // The position attribute's number in the stream; null: the stream's only one.
   positionId: number | null;
   // The number of the attribute of distances; null: it has none.
@@ -76,11 +79,24 @@ function decode(draco: DracoModule, { bytes, positionId, distanceId }: DecodeReq
   }
 }
 
+function plain(bytes: Uint8Array<ArrayBuffer>, arrays: PlainArrays): Triangles {
+  const floatsAt = (begin: number, count: number): Float32Array<ArrayBuffer> => new Float32Array(bytes.slice(begin, begin + 4 * count).buffer);
+  const triangles = {
+    positions: floatsAt(arrays.positions, 3 * arrays.vertices),
+    index: new Uint32Array(bytes.slice(arrays.index, arrays.index + 4 * arrays.corners).buffer),
+  };
+  return arrays.distances === null ? triangles : { ...triangles, distances: floatsAt(arrays.distances, arrays.vertices) };
+}
+
+async function trianglesOf(request: DecodeRequest): Promise<Triangles> {
+  return request.arrays ? plain(request.bytes, request.arrays) : decode(await ready, request);
+}
+
 scope.onmessage = (event) => {
   const request = event.data;
-  ready
-    .then((draco) => {
-      const blocks = split(decode(draco, request)).map((part) => prepare(part, request.cell, request.hasCreases));
+  trianglesOf(request)
+    .then((triangles) => {
+      const blocks = split(triangles).map((part) => prepare(part, request.cell, request.hasCreases));
       scope.postMessage({ id: request.id, blocks, error: '' }, buffersIn(blocks));
     })
     .catch((error: unknown) => {

@@ -1,5 +1,5 @@
-// A GLB file (glTF 2.0) read while it arrives: the description first, then each Draco stream of it as
-// soon as its bytes are there.
+// A GLB file (glTF 2.0) read while it arrives: the description first, then each Draco stream of it, or
+// each surface that is not compressed, as soon as its bytes are there.
 
 import type { Label } from '../api/types';
 const magic = 0x46546c67;
@@ -8,13 +8,28 @@ const binaryChunk = 0x004e4942;
 const headerBytes = 20; // of the file and of its first chunk
 const chunkHeaderBytes = 8;
 const largestJson = 256 * 1024 * 1024;
+// glTF 2.0, section 3.6.2.
+const floatType = 5126;
+const unsignedIntType = 5125;
 
-export interface DracoPrimitive {
+// Where floats and 32-bit indices begin in the bytes of a primitive that is not compressed.
+export interface PlainArrays {
+  positions: number;
+  index: number;
+  // Of the distances to the surface as it was extracted; null where the file has none.
+  distances: number | null;
+  vertices: number;
+  corners: number;
+}
+
+export interface Primitive {
   // Place in the binary chunk.
   offset: number;
   length: number;
-  positionId: number;
-  // Of the distances to the surface as it was extracted; null where the file has none.
+  // Of a primitive that is not compressed.
+  arrays?: PlainArrays;
+  // The numbers of the attributes in a Draco stream; null where there are none.
+  positionId: number | null;
   distanceId: number | null;
   // Of the coarsest level of detail, which stands for finer ones while these come, and while it moves.
   isCoarse: boolean;
@@ -29,6 +44,14 @@ export interface DracoPrimitive {
 export interface Part {
   label: Label;
   colour: string; // #rrggbb
+}
+
+interface Accessor {
+  bufferView?: number;
+  componentType?: number;
+  count: number;
+  min?: number[];
+  max?: number[];
 }
 
 interface Gltf {
@@ -49,7 +72,7 @@ interface Gltf {
     extensions?: { MSFT_lod?: { ids?: number[] } };
   }[];
   materials?: { pbrMetallicRoughness?: { baseColorFactor?: number[] } }[];
-  accessors?: { count: number; min?: number[]; max?: number[] }[];
+  accessors?: Accessor[];
   bufferViews?: { byteOffset?: number; byteLength: number }[];
 }
 
@@ -98,8 +121,39 @@ function placesOf({ nodes = [] }: Gltf): Map<number, Place> {
   return places;
 }
 
+// The place of arrays that hold a surface as it is; null where an array is missing or has other numbers.
+function plainPlaceOf(
+  gltf: Gltf,
+  { attributes, indices }: { attributes: Record<string, number>; indices?: number },
+): { offset: number; length: number; arrays: PlainArrays } | null {
+  const arrayOf = (number: number | undefined, type: number, width: number): { begin: number; end: number; count: number } | null => {
+    const accessor = gltf.accessors?.[number ?? -1];
+    const view = gltf.bufferViews?.[accessor?.bufferView ?? -1];
+    if (!accessor || !view || accessor.componentType !== type || view.byteLength !== 4 * width * accessor.count) return null;
+    const begin = view.byteOffset ?? 0;
+    return { begin, end: begin + view.byteLength, count: accessor.count };
+  };
+  const positions = arrayOf(attributes.POSITION, floatType, 3);
+  const index = arrayOf(indices, unsignedIntType, 1);
+  if (!positions || !index) return null;
+  const distances = arrayOf(attributes._DISTANCE_MM, floatType, 1);
+  const all = [positions, index, ...(distances ? [distances] : [])];
+  const offset = Math.min(...all.map(({ begin }) => begin));
+  return {
+    offset,
+    length: Math.max(...all.map(({ end }) => end)) - offset,
+    arrays: {
+      positions: positions.begin - offset,
+      index: index.begin - offset,
+      distances: distances && distances.begin - offset,
+      vertices: positions.count,
+      corners: index.count,
+    },
+  };
+}
+
 // Of the finest level of detail, and of the coarsest where there are several.
-export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
+export function primitivesOf(gltf: Gltf): Primitive[] {
   const places = placesOf(gltf);
   const primitives = (gltf.meshes ?? []).flatMap((mesh, number) => {
     const { label, level, levels } = places.get(number) ?? { label: undefined, level: 0, levels: 1 };
@@ -113,13 +167,13 @@ export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
     const position = gltf.accessors?.[primitive.attributes.POSITION ?? -1];
     const indices = gltf.accessors?.[primitive.indices ?? -1];
     const positionId = draco?.attributes.POSITION;
-    if (!view || !position || !indices || positionId === undefined) {
-      throw new Error('The GLB file holds a mesh that is not compressed with Draco.');
+    const place = view ? { offset: view.byteOffset ?? 0, length: view.byteLength } : plainPlaceOf(gltf, primitive);
+    if (!place || !position || !indices || (draco && positionId === undefined)) {
+      throw new Error('The GLB file holds a mesh that is not compressed with Draco, and in another form than plain arrays.');
     }
     return {
-      offset: view.byteOffset ?? 0,
-      length: view.byteLength,
-      positionId,
+      ...place,
+      positionId: positionId ?? null,
       distanceId: draco?.attributes._DISTANCE_MM ?? null,
       isCoarse,
       triangles: indices.count / 3,
@@ -132,7 +186,7 @@ export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
 }
 
 export interface GlbListener {
-  onPrimitives: (primitives: DracoPrimitive[]) => void;
+  onPrimitives: (primitives: Primitive[]) => void;
   // The bytes are the listener's to keep.
   onStream: (index: number, bytes: Uint8Array<ArrayBuffer>) => void;
 }
@@ -142,7 +196,7 @@ export class GlbReader {
   private jsonBytes = -1;
   private binary: Uint8Array<ArrayBuffer> | null = null;
   private filled = 0;
-  private primitives: DracoPrimitive[] = [];
+  private primitives: Primitive[] = [];
   // The primitives' numbers as their bytes come.
   private order: number[] = [];
   private next = 0;

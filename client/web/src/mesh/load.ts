@@ -4,7 +4,7 @@ import { ApiError, asApiError, unreachable } from '../api/problem';
 import { sleep } from '../api/sleep';
 import type { Job, MeshFile } from '../api/types';
 import { coarseCell, type Block } from './blocks';
-import { GlbReader, type DracoPrimitive, type Part } from './glb';
+import { GlbReader, type Part, type Primitive } from './glb';
 import { decoders } from './pool';
 
 export interface LoadProgress {
@@ -29,11 +29,11 @@ const mostResumes = 5;
 const resumeDelay = 1000;
 
 // The file that the page can show; null when the job was asked for neither GLB nor Draco, or in a form
-// that the page does not read: GLB packed by meshoptimizer, Draco in another space than the slices'.
+// that the page does not read: GLB with another codec than Draco's, Draco in another space than the slices'.
 export function viewableFile(job: Job): { file: MeshFile; format: 'glb' | 'drc' } | null {
   const files = job.mesh?.files;
   const { glb_codec: codec = 'draco', space = 'lps' } = job.parameters;
-  if (files?.glb && codec === 'draco') return { file: files.glb, format: 'glb' };
+  if (files?.glb && (codec === 'draco' || codec === 'none')) return { file: files.glb, format: 'glb' };
   if (files?.drc && space === 'lps') return { file: files.drc, format: 'drc' };
   return null;
 }
@@ -111,9 +111,9 @@ export async function loadMesh(
   const cell = coarseCell(job.mesh?.area_mm2 ?? 0);
   const began = performance.now();
   const decoding: Promise<void>[] = [];
-  const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: DracoPrimitive | undefined): void => {
-    const { positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
-    const done = decoders.decode(bytes, { positionId, distanceId, cell, hasCreases: part !== null }, signal).then((blocks) => {
+  const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: Primitive | undefined): void => {
+    const { arrays, positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
+    const done = decoders.decode(bytes, { arrays, positionId, distanceId, cell, hasCreases: part !== null }, signal).then((blocks) => {
       if (signal.aborted) return;
       listener.onBlocks(blocks, part, isCoarse);
     });
@@ -124,7 +124,7 @@ export async function loadMesh(
   };
 
   if (format === 'glb') {
-    let primitives: DracoPrimitive[] = [];
+    let primitives: Primitive[] = [];
     const reader = new GlbReader({
       onPrimitives: (all) => {
         primitives = all;

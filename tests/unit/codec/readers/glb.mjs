@@ -70,6 +70,14 @@ function rotated([qx, qy, qz, qw], [x, y, z]) {
   ];
 }
 
+// Some readers take the names of generic attributes from the stream's metadata. Throws if the attribute has no such name there.
+function expectName(decoder, mesh, name, attribute) {
+  const id = decoder.GetAttributeIdByMetadataEntry(mesh, 'name', name);
+  if (id < 0 || decoder.GetAttribute(mesh, id).unique_id() !== attribute.unique_id()) {
+    throw new Error(`the stream's metadata does not name ${name}`);
+  }
+}
+
 class Glb {
   constructor(bytes) {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
@@ -82,18 +90,25 @@ class Glb {
     return this.binary.subarray(byteOffset, byteOffset + byteLength);
   }
 
-  // An accessor's numbers, as many of each element as it has, unpacked by meshoptimizer.
-  unpacked(number) {
-    const accessor = this.gltf.accessors[number];
-    const compressed = this.gltf.bufferViews[accessor.bufferView].extensions.EXT_meshopt_compression;
+  // The bytes of a buffer view, unpacked by meshoptimizer if they are compressed.
+  viewBytes({ extensions = {}, ...view }) {
+    const compressed = extensions.EXT_meshopt_compression ?? extensions.KHR_meshopt_compression;
+    if (compressed === undefined) return this.part(view).slice();
     const { byteStride, count, mode, filter } = compressed;
     const bytes = new Uint8Array(count * byteStride);
     MeshoptDecoder.decodeGltfBuffer(bytes, count, byteStride, this.part(compressed), mode, filter);
-    const all = new typedArrays[accessor.componentType](bytes.buffer);
-    const perElement = byteStride / all.BYTES_PER_ELEMENT;
-    const width = accessor.type === 'VEC3' ? 3 : 1;
-    const scale = accessor.normalized ? 1 / 127 : 1;
-    if (mode === 'TRIANGLES') return all;
+    return bytes;
+  }
+
+  // An accessor's numbers, as many of each element as it has.
+  unpacked(number) {
+    const { bufferView, componentType, count, type, normalized } = this.gltf.accessors[number];
+    const view = this.gltf.bufferViews[bufferView];
+    const all = new typedArrays[componentType](this.viewBytes(view).buffer);
+    const width = type === 'VEC3' ? 3 : 1;
+    if (view.byteStride === undefined) return Uint32Array.from(all); // indices
+    const perElement = view.byteStride / all.BYTES_PER_ELEMENT;
+    const scale = normalized ? 1 / 127 : 1;
     return Float32Array.from({ length: count * width }, (_, i) => all[Math.floor(i / width) * perElement + (i % width)] * scale);
   }
 
@@ -114,8 +129,10 @@ class Glb {
   unpack(primitive, node) {
     const { POSITION, NORMAL, _DISTANCE_MM } = primitive.attributes;
     const stored = this.unpacked(POSITION);
-    const points = new Float32Array(stored.length);
-    for (let at = 0; at < stored.length; at += 3) {
+    // Floats without compression are LPS millimetres to the bit, which the nodes would round.
+    const isPlain = this.gltf.extensionsRequired === undefined;
+    const points = isPlain ? stored : new Float32Array(stored.length);
+    for (let at = 0; at < stored.length && !isPlain; at += 3) {
       const [x, y, z] = this.inScene(node, [...stored.subarray(at, at + 3)]);
       points.set([1000 * x, -1000 * z, 1000 * y], at);
     }
@@ -129,9 +146,12 @@ class Glb {
       mesh.primitives.flatMap((primitive) => {
         const draco = primitive.extensions?.KHR_draco_mesh_compression;
         if (draco === undefined) return this.unpack(primitive, this.gltf.nodes.findIndex((node) => node.mesh === number));
-        return decode(this.part(this.gltf.bufferViews[draco.bufferView]), (decoder, read, name) =>
-          name in draco.attributes ? decoder.GetAttributeByUniqueId(read, draco.attributes[name]) : undefined,
-        );
+        return decode(this.part(this.gltf.bufferViews[draco.bufferView]), (decoder, read, name) => {
+          if (!(name in draco.attributes)) return undefined;
+          const attribute = decoder.GetAttributeByUniqueId(read, draco.attributes[name]);
+          if (name.startsWith('_')) expectName(decoder, read, name, attribute);
+          return attribute;
+        });
       }),
     );
   }

@@ -1,4 +1,4 @@
-"""read_surface.py FILE OUT: what VTK makes of a .vtk or .vtp file, and nibabel of a .gii file.
+"""read_surface.py FILE OUT: what VTK makes of a .vtk, .vtp or .glb file, and nibabel of a .gii file.
 
 Writes the numbers of points, of triangles, of labels and of bytes of text as 32-bit numbers to OUT,
 then points as floats, triangles as 32-bit indices, labels as 64-bit numbers, and the text: what the file
@@ -44,6 +44,39 @@ def by_vtk(path):
     return points, triangles, labels, told
 
 
+def by_vtk_from_gltf(path):
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOGeometry import vtkGLTFReader
+
+    reader = vtkGLTFReader()
+    said = []  # an exception does not leave VTK's observers
+    for event in ('ErrorEvent', 'WarningEvent'):
+        reader.AddObserver(event, lambda _, told: said.append(told))
+    reader.SetFileName(path)
+    reader.Update()
+    if said:
+        sys.exit(f'VTK: {said}')
+    nothing = numpy.zeros((0, 3), numpy.float32)
+    points, triangles, arrays = [nothing], [nothing.astype(numpy.uint32)], []
+    count = 0
+    output = reader.GetOutput()
+    each = output.NewIterator()
+    each.InitTraversal()
+    while not each.IsDoneWithTraversal():
+        surface = each.GetCurrentDataObject()
+        corners = surface.GetPolys()
+        if corners.GetNumberOfCells() != surface.GetNumberOfCells():
+            sys.exit('there are other cells than polygons')
+        places = vtk_to_numpy(surface.GetPoints().GetData())
+        triangles.append(vtk_to_numpy(corners.GetConnectivityArray()).reshape(-1, 3) + count)
+        points.append(places)
+        count += len(places)
+        data = surface.GetPointData()
+        arrays.append(sorted(data.GetArrayName(n) for n in range(data.GetNumberOfArrays())))
+        each.GoToNextItem()
+    return numpy.concatenate(points), numpy.concatenate(triangles), numpy.zeros(0, numpy.int64), {'arrays': arrays}
+
+
 def by_nibabel(path):
     import nibabel
 
@@ -61,7 +94,8 @@ def by_nibabel(path):
 
 
 def main(path, out):
-    points, triangles, labels, told = (by_nibabel if path.endswith('.gii') else by_vtk)(path)
+    readers = {'gii': by_nibabel, 'glb': by_vtk_from_gltf}
+    points, triangles, labels, told = readers.get(path.rsplit('.')[-1], by_vtk)(path)
     if points.dtype != numpy.float32:
         sys.exit(f'points are {points.dtype}')
     text = json.dumps(told).encode()

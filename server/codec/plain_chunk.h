@@ -1,0 +1,21 @@
+// A whole surface as arrays of a glTF buffer that hold it as it is: its floats, and 32-bit indices.
+// Private to this folder.
+#pragma once
+
+#include <span>
+
+#include "server/codec/array_chunk.h"
+#include "server/codec/encode.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::codec {
+
+// The arrays of the mesh. The chunk has no bytes: put_plain writes them. Constant memory.
+ArrayChunk describe_plain(const mesh::Mesh& mesh, const MeshParameters& parameters);
+
+// Writes those arrays. `distances` has one for each vertex, or none. Holds the normals in memory if
+// the mesh has none of its own. Throws Error kCancelled, which is checked between pieces.
+void put_plain(const mesh::Mesh& mesh, const MeshParameters& parameters,
+               std::span<const float> distances, const mesh::Context& context, const Sink& sink);
+
+}  // namespace isomesh::codec
