@@ -1,0 +1,65 @@
+"""What all readers in Python share. `main(version, read)` reads the file that the command line names and prints one line of JSON:
+{version, surfaces: [{name, colour, triangles, vertices, bounds, normals, labels, values}]} or {version, error}.
+"""
+import json
+import os
+import struct
+import subprocess
+import sys
+
+
+def surface(points, triangles, **more):
+    """`points` are rows of x, y, z; `triangles` is how many there are; `more` has name, colour (#rrggbb), normals, labels, values."""
+    columns = list(zip(*[[float(v) for v in point] for point in points]))
+    bounds = [[f(column) for column in columns] for f in (min, max)] if columns else None
+    return {'triangles': int(triangles), 'vertices': len(points), 'bounds': bounds, **more}
+
+
+def hex_of(values):
+    return '#' + ''.join(f'{max(0, round(255 * float(v))):02x}' for v in values[:3])
+
+
+def hex_of_linear(values):
+    """Linear red, green and blue from 0 to 1, as glTF has them."""
+    return hex_of([12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in values[:3]])
+
+
+def said(*command, **options):
+    """What a program prints; raises if it is ended by a signal."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors='replace', **options)
+    if done.returncode < 0 or 128 < done.returncode < 160:
+        raise RuntimeError(f'ends with signal {done.returncode % 128}')
+    return done.stdout
+
+
+def package_version(name):
+    """The upstream part of a Debian package's version."""
+    full = said('dpkg-query', '--show', '--showformat=${Version}', name)
+    return full.split(':')[-1].split('-')[0].split('+')[0].split('~')[0]
+
+
+def surface_of_stl(path):
+    """A binary STL that a program wrote."""
+    with open(path, 'rb') as file:
+        data = file.read()[84:]
+    rows = [struct.unpack_from('<12f', data, at) for at in range(0, len(data) - 49, 50)]
+    return surface([row[at : at + 3] for row in rows for at in (3, 6, 9)], len(rows))
+
+
+def surface_of_obj(path):
+    """An OBJ that a program wrote."""
+    with open(path, encoding='utf-8', errors='replace') as file:
+        lines = [line.split() for line in file]
+    return surface([line[1:4] for line in lines if line[:1] == ['v']], sum(line[:1] == ['f'] for line in lines))
+
+
+def main(version, read, path=None):
+    path = path or sys.argv[-1]
+    answer = {'version': version}
+    try:
+        answer['surfaces'] = read(path, path.rsplit('.', 1)[-1])
+    except (Exception, SystemExit) as error:  # whatever a reader raises is its answer
+        answer['error'] = (str(error).strip() or repr(error)).splitlines()[-1]
+    # Some programs have a standard output of their own, and some end badly when they clean up.
+    os.write(1, b'\n' + json.dumps(answer).encode() + b'\n')
+    os._exit(0)

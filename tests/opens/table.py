@@ -1,0 +1,86 @@
+"""Writes docs/opens-in.md from what the readers answered."""
+import re
+
+import judge
+
+KINDS = ['glb-none', 'glb-quantized', 'glb-meshopt', 'glb-khr-meshopt', 'glb-draco', 'drc', 'stl', 'ply', 'obj', '3mf', 'usda', 'usdz', 'off']
+KINDS += ['vtk', 'vtp', 'gii']
+MAIN = {'drc': 'ball', 'stl': 'ball', 'off': 'ball', 'gii': 'ball'}
+COLUMNS = ['triangles', 'place', 'names', 'colours', 'labels', 'normals', 'distances']
+SPECIAL = {
+    'open': 'a surface that is not closed',
+    'lods': 'two levels of detail',
+    'distances': 'distances',
+    'head': 'a large surface',
+}
+
+
+def title(kind):
+    return f'`glb`, {kind[4:]}' if kind.startswith('glb') else f'`{kind}`'
+
+
+def short(cells):
+    """One cell of the large table."""
+    words, is_right = cells['triangles']
+    if not is_right:
+        return f'**{words}**'
+    lacks = [
+        f'{"other" if cells[column][0].startswith("other") else "no"} {column}'
+        for column in ('names', 'colours')
+        if column in cells and not cells[column][1]
+    ]
+    lacks += [cells['place'][0].split(', ')[-1]] if not cells['place'][1] else []
+    if lacks:
+        return f'**{", ".join(lacks)}**'
+    return words.replace(', three vertices each', '')
+
+
+def row(columns):
+    return f'| {" | ".join(columns)} |'
+
+
+def table(head, rows):
+    return ['', row(head), '|' + '---|' * len(head), *map(row, rows)]
+
+
+def overview(readers, judged):
+    rows = []
+    for reader, program in readers:
+        found = [judged.get((reader.key, f'{MAIN.get(kind, "atlas")}-{kind}')) for kind in KINDS]
+        rows.append([program, *('' if cells is None else short(cells) for cells in found)])
+    return table(['program', *map(title, KINDS)], rows)
+
+
+def details(readers, judged, file):
+    """Programs that get the same share a row. Those that open nothing are in the large table."""
+    programs = {}
+    for reader, program in readers:
+        cells = judged.get((reader.key, file))
+        if cells and len(cells) > 1:
+            programs.setdefault(tuple(cells.get(column, ('–', True)) for column in COLUMNS), []).append(program)
+    columns = [column for at, column in enumerate(COLUMNS) if any(cells[at][0] != '–' for cells in programs)]
+    rows = []
+    for cells, named in programs.items():
+        kept = [cell for column, cell in zip(COLUMNS, cells) if column in columns]
+        rows.append([', '.join(named), *(words if is_right else f'**{words}**' for words, is_right in kept)])
+    return table(['programs', *columns], rows) if rows else []
+
+
+def write(path, readers, files, answers):
+    """Replaces what stands between the marks in the page."""
+    by_name = {file.name: file for file in files}
+    wanted = {(reader.key, file.name) for reader in readers for file in files if file.kind in reader.kinds}
+    judged = {key: judge.cells(by_name[key[1]], answer) for key, answer in answers.items() if key in wanted}
+    versions = {key[0]: answer['version'] for key, answer in answers.items() if 'version' in answer}
+    named = [(reader, f'{reader.program} {versions[reader.key]}') for reader in readers if reader.key in versions]
+    lines = ['## Which format in which program', *overview(named, judged), '', '## What arrives']
+    for kind in KINDS:
+        lines += ['', f'### {title(kind)}', *details(named, judged, f'{MAIN.get(kind, "atlas")}-{kind}')]
+    for file in files:
+        if file.shape in SPECIAL:
+            lines += ['', f'### {title(file.kind)}: {SPECIAL[file.shape]}', *details(named, judged, file.name)]
+    text = path.read_text()
+    begin, end = '<!-- tests/opens/run writes from here -->\n', '\n<!-- to here -->'
+    made = re.sub(f'{begin}.*?{end}', lambda _: begin + '\n'.join(lines) + end, text, flags=re.DOTALL)
+    path.write_text(made)
+    return judged
