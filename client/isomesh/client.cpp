@@ -115,11 +115,11 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
                                         (label ? " of the label " + std::to_string(*label) : ""));
 }
 
-// The materials beside an OBJ. Control characters would end the line that names them.
+// The materials beside an OBJ. Readers end their name at a blank, and some change a backslash.
 std::filesystem::path materials_beside(const std::filesystem::path& obj) {
   std::string name = obj.filename().replace_extension(".mtl").string();
   std::ranges::replace_if(
-      name, [](char c) { return static_cast<unsigned char>(c) < ' '; }, '_');
+      name, [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\\'; }, '_');
   return obj.parent_path() / name;
 }
 

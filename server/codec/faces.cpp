@@ -5,8 +5,6 @@
 #include <utility>
 
 #include "proto/error.h"
-#include "server/mesh/labels/label_surface.h"
-#include "server/mesh/parallel.h"
 
 namespace isomesh::codec {
 
@@ -39,12 +37,9 @@ std::size_t count_of(const std::vector<FaceRun>& runs) {
   return faces;
 }
 
-std::vector<std::size_t> vertices_of_labels(const LabelledSurface& surface,
-                                            const mesh::Context& context) {
-  std::vector<std::size_t> vertices(surface.labels.size());
-  mesh::parallel_for({context.stop, nullptr}, vertices.size(), [&](std::size_t n) {
-    vertices[n] = vertices_of_label(surface.walls, surface.triangles, n + 1).size();
-  });
+std::uint64_t own_vertices(const LabelledSurface& surface) {
+  std::uint64_t vertices = 0;
+  for (const LabelSummary& label : surface.labels) vertices += label.vertices;
   return vertices;
 }
 

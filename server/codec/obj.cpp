@@ -1,4 +1,3 @@
-#include <numeric>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,9 +67,7 @@ class ObjWriter {
 void encode_obj_labels(const LabelledSurface& surface, const FileContent& content,
                        const mesh::Context& context, const Sink& sink) {
   put_text(sink, "mtllib " + std::string(kMaterialsName) + '\n');
-  const std::vector<std::size_t> vertices = vertices_of_labels(surface, context);
-  ObjWriter writer(content, context, sink,
-                   std::reduce(vertices.begin(), vertices.end()) + count_of(faces_of(content)));
+  ObjWriter writer(content, context, sink, own_vertices(surface) + count_of(faces_of(content)));
   ObjGroups groups;
   mesh::Mesh mesh;
   for (std::size_t n = 1; n <= surface.labels.size(); ++n) {

@@ -87,8 +87,8 @@ std::string about_coordinates(const FileContent& content) {
   if (content.unit != length_unit({})) text += ", written as millimetres";
   text += '.';
   if (const auto limit = content.provenance.parameters.max_error_mm) {
-    text += " At most " + to_text(*limit) + ' ' + std::string(content.unit.symbol) +
-            " from the extracted surface.";
+    text += " Requested largest error: " + to_text(*limit) + ' ' +
+            std::string(content.unit.symbol) + '.';
   }
   return text;
 }

@@ -62,7 +62,7 @@ TEST(ThreeMf, DescribesSpaceUnitAndLimit) {
       encoded(test::meshes_to_encode().front().mesh, MeshFormat::k3mf, provenance));
   EXPECT_EQ(model.metadata.at("Description"),
             "The surface at the value 60. Coordinates in RAS, in angstrom, written as millimetres. "
-            "At most 0.1 angstrom from the extracted surface.");
+            "Requested largest error: 0.1 angstrom.");
 }
 
 TEST(ThreeMf, SaysWhereItComesFrom) {

@@ -422,8 +422,8 @@ class Client:
         head, line = obj.read(_LONGEST_OBJ_HEAD), b"\nmtllib mesh.mtl\n"
         if line not in head:
             return
-        # A control character would end the line.
-        beside = target.with_name(re.sub("[\0-\x1f]", "_", target.with_suffix(".mtl").name))
+        # Readers end the name at a blank, and some change a backslash.
+        beside = target.with_name(re.sub(r"[\0- \\]", "_", target.with_suffix(".mtl").name))
         with written(beside) as file:
             file.write(self._exchange.text(f"/v1/jobs/{quote(job, safe='')}/mesh.mtl"))
         text = head.replace(line, b"\nmtllib " + os.fsencode(beside.name) + b"\n", 1) + obj.read()
