@@ -67,17 +67,18 @@ def place(file, surfaces):
 
 
 def triangles(file, surfaces):
-    count = sum(s['triangles'] or 0 for s in surfaces)
-    if surfaces[0]['triangles'] is None:
+    first = surfaces[0]
+    if first['triangles'] is None:
         return 'opens', True
-    if vertices == 0 and surfaces[0]['vertices'] is not None:
-        return '0 vertices', False
+    count = sum(s['triangles'] for s in surfaces)
     vertices = sum(s['vertices'] or 0 for s in surfaces)
     if count != file.triangles:
         return f'{count} of {file.triangles}', False
-    if vertices and vertices == 3 * count and file.suffix != 'stl':
+    if vertices == 0 and first['vertices'] is not None:
+        return '0 vertices', False
+    if vertices == 3 * count and file.suffix != 'stl':
         return 'all, three vertices each', True
-    return 'all' + (f', {surfaces[0]["note"]}' if surfaces[0].get('note') else ''), True
+    return f'all, {first["note"]}' if first.get('note') else 'all', True
 
 
 def plain(name):
@@ -88,10 +89,11 @@ def names(file, surfaces):
     found = [str(s.get('name')) for s in surfaces]
     if all(name in found for name in file.labels):
         return 'all', True
-    for change in (str, plain):
-        changed = [next((other for other in found if change(name) in change(other)), None) for name in file.labels]
-        if all(changed):
-            return f'as `{max(changed, key=lambda name: sum(not c.isalpha() for c in name))}`', True
+    if all(any(name in other for other in found) for name in file.labels):
+        return 'longer', True
+    changed = [next((other for other in found if plain(name) == plain(other)), None) for name in file.labels]
+    if all(changed):
+        return f'as `{max(changed, key=lambda name: sum(not c.isalnum() for c in name))}`', True
     return 'none', False
 
 
