@@ -23,6 +23,7 @@ import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
 import { firstMet, type Interval } from './pick';
+import { placeholder } from './placeholder';
 import { defaultStyle, type SurfaceStyle } from './style';
 import type { Uploading } from './uploading';
 
@@ -109,7 +110,7 @@ export class Parts {
   private readonly shader = new DistanceShader();
   // What a surface without labels is drawn with, so that its shader is there before its first block.
   private readonly usual = material(neutral);
-  private readonly probe = new Mesh(new BufferGeometry(), this.usual);
+  private readonly probe = new Mesh(placeholder(), this.usual);
 
   constructor(
     private readonly scene: Object3D,
@@ -237,7 +238,7 @@ export class Parts {
     );
     for (const look of this.looks.values()) {
       if (look.copy.length > 0) continue;
-      look.copy = look.materials.map((made) => new Mesh(new BufferGeometry(), made));
+      look.copy = look.materials.map((made) => new Mesh(placeholder(), made));
       this.place(look.copy);
     }
     this.setLevel(this.level);

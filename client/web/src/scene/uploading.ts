@@ -1,7 +1,8 @@
 // Brings blocks to the graphics processor some at a time, before they are drawn: in one frame with their drawing,
 // millions of triangles hold the page up for seconds where software draws.
-import { BufferGeometry, Mesh, MeshBasicMaterial, Scene, WebGLRenderTarget, type Camera, type WebGLRenderer } from 'three';
+import { Mesh, MeshBasicMaterial, Scene, WebGLRenderTarget, type BufferGeometry, type Camera, type WebGLRenderer } from 'three';
 import { compile } from './compile';
+import { placeholder } from './placeholder';
 
 // In one step.
 const mostBytes = 2_500_000;
@@ -20,7 +21,7 @@ export class Uploading {
   private waiting: Waiting[] = [];
   private readonly scene = new Scene();
   private readonly material = new MeshBasicMaterial();
-  private readonly mesh = new Mesh<BufferGeometry, MeshBasicMaterial>(new BufferGeometry(), this.material);
+  private readonly mesh = new Mesh<BufferGeometry, MeshBasicMaterial>(placeholder(), this.material);
   private readonly target = new WebGLRenderTarget(1, 1);
 
   constructor(private readonly renderer: WebGLRenderer) {
