@@ -5,8 +5,6 @@
 #include <utility>
 
 #include "proto/error.h"
-#include "server/mesh/labels/label_surface.h"
-#include "server/mesh/parallel.h"
 
 namespace isomesh::codec {
 
@@ -37,15 +35,6 @@ std::size_t count_of(const std::vector<FaceRun>& runs) {
   std::size_t faces = 0;
   for (const FaceRun& run : runs) faces += run.count();
   return faces;
-}
-
-std::vector<std::size_t> vertices_of_labels(const LabelledSurface& surface,
-                                            const mesh::Context& context) {
-  std::vector<std::size_t> vertices(surface.labels.size());
-  mesh::parallel_for({context.stop, nullptr}, vertices.size(), [&](std::size_t n) {
-    vertices[n] = vertices_of_label(surface.walls, surface.triangles, n + 1).size();
-  });
-  return vertices;
 }
 
 LabelType label_type(const LabelledSurface& surface) {

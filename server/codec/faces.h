@@ -41,11 +41,6 @@ std::vector<FaceRun> faces_of(const FileContent& content);
 
 std::size_t count_of(const std::vector<FaceRun>& runs);
 
-// The vertices of each label's own surface, in the order of the labels. A vertex of a wall counts
-// for all of its labels. Throws Error kCancelled.
-std::vector<std::size_t> vertices_of_labels(const LabelledSurface& surface,
-                                            const mesh::Context& context);
-
 // The integers that hold all labels of a surface.
 enum class LabelType { kInt32, kUint32, kInt64 };
 LabelType label_type(const LabelledSurface& surface);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <string>
 #include <vector>
@@ -96,8 +95,8 @@ class LabelValues {
 // Labels are at vertices, because some readers fail at any property of faces beside the list.
 void encode_ply_labels(const LabelledSurface& surface, const FileContent& content,
                        const mesh::Context& context, const Sink& sink) {
-  const std::vector<std::size_t> own = vertices_of_labels(surface, context);
-  const std::size_t vertices = std::reduce(own.begin(), own.end());
+  std::uint64_t vertices = 0;
+  for (const LabelSummary& label : surface.labels) vertices += label.vertices;
   if (vertices > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the labels have more vertices than a PLY file can number");
   }
@@ -108,22 +107,25 @@ void encode_ply_labels(const LabelledSurface& surface, const FileContent& conten
                                 values.property(),
                             faces));
   BlockWriter writer(context, sink, vertices + faces);
-  for (std::size_t n = 0; n < own.size(); ++n) {
+  for (std::size_t n = 0; n < surface.labels.size(); ++n) {
     const LabelVertex vertex = {color_in_bytes(surface.labels[n]), values.of(n)};
     const auto chosen = vertices_of_label(surface.walls, surface.triangles, n + 1);
+    if (chosen.size() != surface.labels[n].vertices) {
+      throw Error(ErrorCode::kInternal, "a label's surface has another number of vertices");
+    }
     writer.write(chosen.size(), LabelVertex::kBytes, [&](std::size_t v, std::byte* out) {
       return vertex.write(in_space(content.mesh.positions[chosen[v]], content.space), out);
     });
   }
   std::uint32_t first = 0;
   mesh::Mesh mesh;
-  for (std::size_t n = 0; n < own.size(); ++n) {
+  for (std::size_t n = 0; n < surface.labels.size(); ++n) {
     extract_label(surface.walls, surface.triangles, n + 1, mesh);
     writer.write(mesh.triangles.size(), kPlyFaceBytes, [&](std::size_t t, std::byte* out) {
       const auto& [a, b, c] = mesh.triangles[t];
       return write_ply_face({first + a, first + b, first + c}, out);
     });
-    first += static_cast<std::uint32_t>(own[n]);
+    first += static_cast<std::uint32_t>(mesh.positions.size());
   }
 }
 
