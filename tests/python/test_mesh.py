@@ -251,8 +251,16 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         mesh.colors = mesh.colors[1:]
         with self.assertRaisesRegex(ValueError, "colors for .* vertices; set colors to None"):
             mesh.save(plain)
+        mesh.colors = numpy.full(mesh.vertices.shape, 256)
+        with self.assertRaisesRegex(ValueError, "colors must be from 0 to 255"):
+            mesh.save(plain)
+        mesh.colors = numpy.full(mesh.vertices.shape, 0.5)
+        with self.assertRaisesRegex(ValueError, "colors must be integers from 0 to 255"):
+            mesh.save(plain)
+        # Without colours a label is a property of faces, as in the server's files before they had colours.
         mesh.colors = None
         self.assertIsNone(isomesh.read_ply(mesh.save(plain)).colors)
+        self.assertIn(b"property list uchar uint vertex_indices\nproperty int label\nend_header\n", plain.read_bytes())
         self.assertEqual(isomesh.read_ply(plain).labels.tolist(), mesh.labels.tolist())
 
     def test_an_obj_of_labels_has_its_materials_beside_it(self):
@@ -260,9 +268,9 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         samples[2:6, 2:10, 2:10], samples[6:10, 2:10, 2:10] = 3, 7
         mesh = self.client.mesh(samples, labels="all", label_colors={7: "#ff0080"}, formats=["obj"])
         lines = mesh.save(self.folder / "two labels.obj").read_text().splitlines()
-        self.assertEqual(lines[:3], ["# isomesh, millimetres, LPS", "mtllib two labels.mtl", "o label_3"])
+        self.assertEqual(lines[:3], ["# isomesh, millimetres, LPS", "mtllib two_labels.mtl", "o label_3"])
         self.assertEqual(sum(line.startswith("f ") for line in lines), len(mesh.faces))
-        materials = (self.folder / "two labels.mtl").read_text()
+        materials = (self.folder / "two_labels.mtl").read_text()
         self.assertIn("newmtl label_7\nKd 1.000000 0.000000 0.501961\n", materials)
         self.client.mesh(ball(), iso=-8, formats=["obj"]).save(self.folder / "ball.obj")
         self.assertFalse((self.folder / "ball.mtl").exists())
