@@ -302,7 +302,7 @@ Normals = bool
 Distances = bool
 Lods = Union['Sequence[float]']
 Merge = bool
-GlbCodec = Literal['draco', 'meshopt', 'khr-meshopt', 'quantized', 'none']
+GlbCodec = Literal['draco', 'none', 'meshopt', 'khr-meshopt', 'quantized']
 Space = Literal['lps', 'ras']
 Priority = Literal['stat', 'routine', 'bulk']
 Certify = bool
@@ -508,12 +508,12 @@ class JobOptions(_Parameters, total=False):
 
     glb_codec
         How the surface in glb is compressed. draco is KHR_draco_mesh_compression and makes the
-        smallest files. meshopt is EXT_meshopt_compression and is read faster; khr-meshopt is
-        the same under the newer name KHR_meshopt_compression. quantized is
-        KHR_mesh_quantization alone: small numbers that are not compressed. Readers must support
-        the one that is used. none needs no extension: floats that are not rounded, in one
-        primitive for each surface, whose size is about ten times that of draco. Every reader of
-        glTF opens it.
+        smallest files. none needs no extension: exact floats in one primitive for each surface,
+        for every reader of glTF, with about ten times as many bytes. meshopt is
+        EXT_meshopt_compression and is read faster than draco; khr-meshopt is the same under the
+        newer name KHR_meshopt_compression. quantized is KHR_mesh_quantization: rounded numbers
+        that are not compressed. Readers must support the one that is used. The command isomesh
+        has the default none.
 
     space
         Directions of x and y in the files: to the patient's left and back, or to the right and
