@@ -234,7 +234,9 @@ TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
   EXPECT_EQ(unzipped(zipped({MeshFormat::kStl}).bytes).at("label 3.stl").size(), 84U);
   EXPECT_NE(encoded(MeshFormat::kPly).find("element face 0"), std::string::npos);
   EXPECT_EQ(encoded(MeshFormat::kObj), "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n");
-  EXPECT_TRUE(test::read_with_lib3mf(encoded(MeshFormat::k3mf)).objects.empty());
+  const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
+  EXPECT_TRUE(model.objects.empty());
+  EXPECT_EQ(model.metadata.at("Title"), "no label");
 }
 
 // Some readers fail at a property of faces beside the list of their vertices.
