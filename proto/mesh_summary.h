@@ -39,7 +39,7 @@ struct FormatRow {
   MeshFormat format;
   std::string_view name;
   std::string_view title;             // for people
-  std::string_view file_suffix = {};  // of offered names; empty: the format's name
+  std::string_view file_suffix = {};  // ends offered names; empty: the format's name
   // A job by labels writes one file of all labels, a file of each label in a ZIP, or both.
   bool holds_all_labels = false;
   bool is_zipped = true;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "base/ids.h"
+#include "server/codec/mesher_version.h"
 #include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/store/audit/trail.h"
@@ -24,7 +25,7 @@ namespace {
 
 store::JobStoreOptions job_options(const Options& options) {
   store::JobStoreOptions result = options.jobs;
-  result.mesher_version = jobs::kMesherVersion;
+  result.mesher_version = codec::kMesherVersion;
   result.job_version = jobs::kJobVersion;
   result.expected_ms = jobs::expected_ms;
   return result;

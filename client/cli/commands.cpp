@@ -111,9 +111,9 @@ int fetch(Client& client, const Options& options) {
   for (const Output& output : outputs) fetch(client, id, output, bar, options.label);
   const ClientTiming seen{.download = milliseconds_since(start)};
   if (options.json) {
-    std::cout << job_json(job, paths_of(outputs), seen) << '\n';
+    std::cout << job_json(job, paths_of(job, outputs, options.label), seen) << '\n';
   } else if (job.mesh && !options.quiet) {
-    std::cout << outputs_report(job, outputs);
+    std::cout << outputs_report(job, outputs, options.label);
   }
   return kDone;
 }

@@ -30,6 +30,14 @@ void fetch_to_pipe(Client& client, const std::string& id, const Output& output, 
   }
 }
 
+// The file of materials that fetch() wrote beside an output; empty if there is none.
+std::filesystem::path materials_of(const Job& job, const Output& output,
+                                   std::optional<std::int64_t> label) {
+  const bool has_materials = job.parameters.labels && !label && output.format == MeshFormat::kObj;
+  if (!has_materials || output.is_stdout() || is_pipe(output.path)) return {};
+  return materials_beside(output.path);
+}
+
 // For a folder that -o names with a slash at its end, or through {folder}.
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
@@ -55,7 +63,8 @@ void fetch(Client& client, const std::string& id, const Output& output, Progress
   bar.clear();
 }
 
-std::string outputs_report(const Job& job, const std::vector<Output>& outputs) {
+std::string outputs_report(const Job& job, const std::vector<Output>& outputs,
+                           std::optional<std::int64_t> label) {
   std::string text;
   for (const Output& output : outputs) {
     if (output.is_stdout()) continue;
@@ -63,6 +72,8 @@ std::string outputs_report(const Job& job, const std::vector<Output>& outputs) {
     text += output.path.string();
     if (file != job.mesh->files.end()) text += "  " + human_bytes(file->second.bytes);
     text += '\n';
+    const std::filesystem::path materials = materials_of(job, output, label);
+    if (!materials.empty()) text += materials.string() + '\n';
   }
   return text;
 }
@@ -71,6 +82,17 @@ std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs) 
   std::vector<std::filesystem::path> paths;
   paths.reserve(outputs.size());
   for (const Output& output : outputs) paths.push_back(output.path);
+  return paths;
+}
+
+std::vector<std::filesystem::path> paths_of(const Job& job, const std::vector<Output>& outputs,
+                                            std::optional<std::int64_t> label) {
+  std::vector<std::filesystem::path> paths;
+  for (const Output& output : outputs) {
+    paths.push_back(output.path);
+    const std::filesystem::path materials = materials_of(job, output, label);
+    if (!materials.empty()) paths.push_back(materials);
+  }
   return paths;
 }
 

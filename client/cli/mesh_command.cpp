@@ -287,7 +287,7 @@ int MeshRun::dry_run(const JobParameters& parameters, const Task& task) {
 }
 
 void MeshRun::report(const Job& job, const std::vector<Output>& outputs, const Task& task) {
-  if (options_.json) return print(job_json(job, paths_of(outputs), seen_, task.origin) + '\n');
+  if (options_.json) return print(job_json(job, paths_of(job, outputs), seen_, task.origin) + '\n');
   const bool has_mesh_on_stdout = std::ranges::any_of(outputs, &Output::is_stdout);
   if (options_.quiet || has_mesh_on_stdout) return;
   std::string text = outputs_report(job, outputs);

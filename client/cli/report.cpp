@@ -80,11 +80,14 @@ void tell_iso(const MeshSummary& mesh, Rows& rows) {
   if (mesh.iso) rows.push_back({"iso-value", human_number(*mesh.iso)});
 }
 
-// An open surface encloses nothing, so the sum over its triangles is not a volume.
+// Unless a surface encloses something, the sum over its triangles is not a volume.
 void tell_volume(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (mesh.empty) return;
   if (!mesh.quality.encloses_volume) {
-    rows.push_back({"volume", "none: the surface is open; --close caps it at the volume's border"});
+    rows.push_back(
+        {"volume", mesh.quality.closed
+                       ? "none: the triangles disagree about which side is outside"
+                       : "none: the surface is open; --close caps it at the volume's border"});
     return;
   }
   const std::string after = mesh.simplified ? " simplified" : " smoothed";
@@ -137,6 +140,7 @@ void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
 
 std::string labels_report(const std::vector<LabelSummary>& labels, const Units& in) {
   bool are_closed = true;
+  bool are_oriented = true;
   Rows rows = {{"label", "name", "triangles", in.cubic(), in.cubic() + " of voxels", "topology"}};
   for (const LabelSummary& label : labels) {
     std::string topology = label.closed ? "closed" : "open";
@@ -146,14 +150,22 @@ std::string labels_report(const std::vector<LabelSummary>& labels, const Units& 
                     label.encloses_volume() ? fixed(label.volume_mm3, 1) : "none",
                     fixed(label.voxels_mm3, 1), topology});
     are_closed = are_closed && label.closed;
+    are_oriented = are_oriented && (label.oriented || !label.closed);
   }
-  const std::string text = in_columns(
+  std::string text = in_columns(
       {Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight, Align::kLeft},
       rows);
-  if (are_closed) return text;
-  return text +
-         "\n  An open label encloses no volume: it touches the volume's border. --close caps it "
-         "there.\n";
+  if (!are_closed) {
+    text +=
+        "\n  An open label encloses no volume: it touches the volume's border. --close caps it "
+        "there.\n";
+  }
+  if (!are_oriented) {
+    text +=
+        "\n  A label that is not oriented encloses no volume: its triangles disagree about which "
+        "side is outside.\n";
+  }
+  return text;
 }
 
 void write_paths(Json& place, const std::vector<std::filesystem::path>& paths) {

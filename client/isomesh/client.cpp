@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/files.h"
 #include "base/hex.h"
 #include "base/ids.h"
 #include "base/sha256.h"
@@ -115,23 +116,16 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
                                         (label ? " of the label " + std::to_string(*label) : ""));
 }
 
-// The materials beside an OBJ. Readers end their name at a blank, and some change a backslash.
-std::filesystem::path materials_beside(const std::filesystem::path& obj) {
-  std::string name = obj.filename().replace_extension(".mtl").string();
-  std::ranges::replace_if(
-      name, [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\\'; }, '_');
-  return obj.parent_path() / name;
-}
-
 // Writes a mesh as it arrives and checks it against the job's size and digest. Not thread safe.
 class Download {
  public:
-  // `materials`: the name that an OBJ of labels gets for its materials; empty for other files.
-  Download(MeshFile announced, const std::filesystem::path& target, std::string materials,
+  Download(MeshFile announced, const std::filesystem::path& target, MeshFormat format,
            const TransferProgress& progress)
       : announced_(std::move(announced)),
         file_(target),
-        materials_(std::move(materials)),
+        materials_(format == MeshFormat::kObj && lower(target.extension().string()) == ".obj"
+                       ? materials_beside(target)
+                       : ""),
         progress_(progress) {}
 
   // The request headers to resume a download; none if nothing has arrived.
@@ -166,9 +160,10 @@ class Download {
     if (received_ < kHeadBytes) write_head();
   }
 
-  // True if the file names materials.
-  bool has_materials() const { return has_materials_; }
+  // The place of the materials that the file names; empty if it names none.
+  std::filesystem::path materials() const { return has_materials_ ? materials_ : ""; }
 
+  void sync() { file_.sync(); }
   void publish() { file_.publish(); }
 
  private:
@@ -192,13 +187,15 @@ class Download {
     const std::string line = "\nmtllib " + std::string(kMaterialsName) + '\n';
     const std::size_t found = materials_.empty() ? std::string::npos : head.find(line);
     has_materials_ = found != std::string::npos;
-    if (has_materials_) head.replace(found, line.size(), "\nmtllib " + materials_ + '\n');
+    if (has_materials_) {
+      head.replace(found, line.size(), "\nmtllib " + materials_.filename().string() + '\n');
+    }
     file_.write(head);
   }
 
   const MeshFile announced_;
   PartFile file_;
-  const std::string materials_;
+  const std::filesystem::path materials_;  // empty for a file that keeps its name of them
   const TransferProgress& progress_;
   std::string head_;  // the first bytes of the file
   bool has_materials_ = false;
@@ -210,6 +207,15 @@ std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_se
 std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(id); }
 
 }  // namespace
+
+std::filesystem::path materials_beside(const std::filesystem::path& obj) {
+  const std::filesystem::path file = behind_links(obj);
+  std::string name = file.filename().replace_extension(".mtl").string();
+  // Readers take several names from the line, divided by blanks, and control characters end it.
+  std::ranges::replace_if(
+      name, [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\\'; }, '_');
+  return file.parent_path() / name;
+}
 
 Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
 Client::~Client() = default;
@@ -345,19 +351,21 @@ void Client::fetch(const std::string& id, MeshFormat format, const std::filesyst
   if (done.mesh && done.mesh->labels_count && (label || !done.mesh->files.contains(format))) {
     done.mesh->labels = job_labels(id);
   }
-  const std::filesystem::path materials = materials_beside(target);
-  Download download(file_of(done, format, label), target,
-                    format == MeshFormat::kObj ? materials.filename().string() : "", progress);
+  Download download(file_of(done, format, label), target, format, progress);
   HttpRequest request{.target = mesh_path(path_segment(id), format, label)};
   request.sink = [&](std::string_view piece) { download.take(piece); };
   request.before_sink = [&](int status) { download.begin(status); };
   impl_->repeat(request, [&] { request.headers = download.headers(); });
   download.check();
-  if (download.has_materials()) {
-    PartFile file(materials);
-    file.write(impl_->repeat({.target = job_path(id) + '/' + std::string(kMaterialsName)}));
-    file.publish();
+  std::optional<PartFile> materials;
+  if (const std::filesystem::path place = download.materials(); !place.empty()) {
+    materials.emplace(place);
+    materials->write(impl_->repeat({.target = job_path(id) + '/' + std::string(kMaterialsName)}));
+    materials->sync();
   }
+  // Both are complete before one of them appears.
+  download.sync();
+  if (materials) materials->publish();
   download.publish();
 }
 

@@ -93,6 +93,11 @@ Error several_volumes(const std::vector<UploadedVolume>& volumes);
 
 using JobListener = std::function<void(const JobEvent& event)>;
 
+// The file of materials that Client::fetch() writes beside an OBJ of labels: for `x.obj` it is
+// `x.mtl`, with `_` for blanks, backslashes and control characters, which no name in an OBJ may
+// have. Follows links.
+std::filesystem::path materials_beside(const std::filesystem::path& obj);
+
 struct JobPage {
   std::vector<Job> jobs;
   std::string next;  // the cursor of the next page; empty on the last
@@ -183,8 +188,8 @@ class Client {
   // SHA-256 that the job states. Resumes after a broken connection. Throws kNotReady if the job has
   // not ended, the job's own error if it failed, kCancelled if it was cancelled, kNotFound if it
   // has no file of that format, kDigestMismatch for wrong bytes. For a job by labels, `label`
-  // selects one label's own surface. An OBJ of all labels gets its materials beside it: for
-  // `x.obj` the file `x.mtl`, whose name replaces that in the OBJ.
+  // selects one label's own surface. An OBJ of all labels, written to a file with the suffix .obj,
+  // gets the file materials_beside() says, and names it.
   void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
              const TransferProgress& progress = {},
              std::optional<std::int64_t> label = std::nullopt);

@@ -127,8 +127,12 @@ bool PartFile::link_to(const std::filesystem::path& path) const {
   return ::linkat(AT_FDCWD, place.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0;
 }
 
-void PartFile::publish() {
+void PartFile::sync() {
   if (::fsync(file_.number()) != 0) fail(target_, errno);
+}
+
+void PartFile::publish() {
+  sync();
   if (part_.empty()) {
     if (link_to(target_)) return;
     // Only a rename replaces a file.

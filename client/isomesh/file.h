@@ -31,7 +31,10 @@ class PartFile {
 
   void restart();
 
-  // Syncs the bytes to disk, then gives the file its name. Call once, last.
+  // Syncs the bytes to disk. publish() does so, too; with this, several files appear together.
+  void sync();
+
+  // Syncs, then gives the file its name. Call once, last.
   void publish();
 
  private:

@@ -132,9 +132,9 @@ Encoder encode_gii;
 // `extracted`, before coordinates are rounded.
 //
 // A label has a node, a mesh and a material below that node. Its node has the label's title, and
-// label, voxels, volume_mm3 and area_mm2 as extras. All labels share the grid: shared walls decode
-// to the same bits. Each label's node has its own coarser levels; the walls are simplified
-// together, so shared walls match there too.
+// label, voxels, area_mm2 and, if it encloses a volume, volume_mm3 as extras. All labels share the
+// grid: shared walls decode to the same bits. Each label's node has its own coarser levels; the
+// walls are simplified together, so shared walls match there too.
 //
 // Throws Error kTooLarge beyond GLB's 4 GiB and kInternal if Draco fails. kCancelled is checked
 // before each block.

@@ -37,12 +37,6 @@ std::size_t count_of(const std::vector<FaceRun>& runs) {
   return faces;
 }
 
-std::uint64_t own_vertices(const LabelledSurface& surface) {
-  std::uint64_t vertices = 0;
-  for (const LabelSummary& label : surface.labels) vertices += label.vertices;
-  return vertices;
-}
-
 LabelType label_type(const LabelledSurface& surface) {
   if (surface.labels.empty()) return LabelType::kInt32;
   const std::int64_t low = surface.labels.front().label;

@@ -41,9 +41,6 @@ std::vector<FaceRun> faces_of(const FileContent& content);
 
 std::size_t count_of(const std::vector<FaceRun>& runs);
 
-// The vertices of all labels' own surfaces. A vertex of a wall counts for each of its labels.
-std::uint64_t own_vertices(const LabelledSurface& surface);
-
 // The integers that hold all labels of a surface.
 enum class LabelType { kInt32, kUint32, kInt64 };
 LabelType label_type(const LabelledSurface& surface);

@@ -110,10 +110,15 @@ double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
          24 * as_double(surface.triangles);
 }
 
-// For encoders that hold one label's surface, which can be almost everything.
+// For encoders that hold one label's surface, which can be almost everything, with marks of its
+// vertices. Half of it, because a job by labels counts the memory of encoders twice, for both sides
+// of its walls, and a label's surface has one.
 std::uint64_t label_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
-  constexpr std::uint64_t kLabelPerTriangle = 30;
-  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
+  constexpr std::uint64_t kMarksPerTriangle = 2;
+  if (!parameters.labels) return 0;
+  return (surface.vertices * sizeof(mesh::Vec3) +
+          surface.triangles * (sizeof(mesh::Triangle) + kMarksPerTriangle)) /
+         2;
 }
 
 std::uint64_t usd_memory(const SurfaceSize& surface, const MeshParameters& parameters) {

@@ -231,10 +231,10 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
 Json extras_of(const LabelSummary& label) {
   Json number;
   json_values::assign(number, label.label);
-  return {{"label", number},
-          {"voxels", label.voxels},
-          {"volume_mm3", label.volume_mm3},
-          {"area_mm2", label.area_mm2}};
+  Json extras = {{"label", number}, {"voxels", label.voxels}};
+  if (label.encloses_volume()) extras["volume_mm3"] = label.volume_mm3;
+  extras["area_mm2"] = label.area_mm2;
+  return extras;
 }
 
 // For each level, the smallest fraction of the screen's height or width at which it is drawn. There

@@ -1,6 +1,5 @@
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
@@ -67,7 +66,9 @@ class ObjWriter {
 void encode_obj_labels(const LabelledSurface& surface, const FileContent& content,
                        const mesh::Context& context, const Sink& sink) {
   put_text(sink, "mtllib " + std::string(kMaterialsName) + '\n');
-  ObjWriter writer(content, context, sink, own_vertices(surface) + count_of(faces_of(content)));
+  std::uint64_t records = count_of(faces_of(content));
+  for (const LabelSummary& label : surface.labels) records += label.vertices;
+  ObjWriter writer(content, context, sink, records);
   ObjGroups groups;
   mesh::Mesh mesh;
   for (std::size_t n = 1; n <= surface.labels.size(); ++n) {

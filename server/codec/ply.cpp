@@ -95,7 +95,8 @@ class LabelValues {
 // Labels are at vertices, because some readers fail at any property of faces beside the list.
 void encode_ply_labels(const LabelledSurface& surface, const FileContent& content,
                        const mesh::Context& context, const Sink& sink) {
-  const std::uint64_t vertices = own_vertices(surface);
+  std::uint64_t vertices = 0;
+  for (const LabelSummary& label : surface.labels) vertices += label.vertices;
   if (vertices > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the labels have more vertices than a PLY file can number");
   }
@@ -110,7 +111,7 @@ void encode_ply_labels(const LabelledSurface& surface, const FileContent& conten
     const LabelVertex vertex = {color_in_bytes(surface.labels[n]), values.of(n)};
     const auto chosen = vertices_of_label(surface.walls, surface.triangles, n + 1);
     if (chosen.size() != surface.labels[n].vertices) {
-      throw Error(ErrorCode::kInternal, "a label has another number of vertices than it tells");
+      throw Error(ErrorCode::kInternal, "a label's surface has another number of vertices");
     }
     writer.write(chosen.size(), LabelVertex::kBytes, [&](std::size_t v, std::byte* out) {
       return vertex.write(in_space(content.mesh.positions[chosen[v]], content.space), out);

@@ -5,6 +5,7 @@
 #include "proto/json.h"
 #include "proto/json_text.h"
 #include "proto/json_tree.h"
+#include "server/codec/mesher_version.h"
 
 namespace isomesh::codec {
 
@@ -33,7 +34,7 @@ std::string provenance_text(const Provenance& provenance) {
   return dump(provenance_json(provenance));
 }
 
-std::string application() { return "isomesh " ISOMESH_VERSION; }
+std::string application() { return std::string("isomesh, mesher ") + kMesherVersion; }
 
 std::string provenance_for_xml(const Provenance& provenance) {
   std::string result;

@@ -13,7 +13,8 @@ nlohmann::ordered_json provenance_json(const Provenance& provenance);
 
 std::string provenance_text(const Provenance& provenance);
 
-// The program that makes the files, with its version: "isomesh 1.2.3".
+// The program that makes the files: "isomesh, mesher 2". Without the version of the release,
+// because releases with the same mesher make the same bytes.
 std::string application();
 
 // As text without characters that XML escapes: some readers do not unescape.

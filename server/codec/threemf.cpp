@@ -80,7 +80,7 @@ std::string in_quotes_of_xml(std::string_view text) { return '"' + xml_escaped(t
 
 std::string in_quotes_of_xml(std::uint64_t number) { return '"' + std::to_string(number) + '"'; }
 
-// On the coordinates, and on their error if it has a limit.
+// On the coordinates, and on the largest error that was asked for.
 std::string about_coordinates(const FileContent& content) {
   std::string text = " Coordinates in " + std::string(letters_of(content.space)) + ", in " +
                      std::string(content.unit.name);
@@ -197,19 +197,22 @@ class Package {
   const Space space_;
   const std::string title_;
   const Sink bytes_ = [this](std::span<const std::byte> piece) { zip_.write(piece); };
-  std::vector<std::uint64_t> objects_;  // with a mesh
-  std::uint64_t last_id_ = 0;           // of the resources
+  std::vector<std::uint64_t> objects_;  // the ids of those with a mesh
+  std::uint64_t last_id_ = 0;           // the resources share one series
 };
 
-// One label's title, or how many there are.
+// One label's title, or how many have triangles.
 std::string title_of_all(std::span<const LabelSummary> labels,
                          const mesh::LabelTriangles& triangles) {
-  std::vector<std::size_t> found;
+  std::size_t count = 0;
+  const LabelSummary* last = nullptr;
   for (std::size_t n = 1; n <= labels.size(); ++n) {
-    if (!triangles.of(n).empty()) found.push_back(n);
+    if (triangles.of(n).empty()) continue;
+    ++count;
+    last = &labels[n - 1];
   }
-  return found.size() == 1 ? title_of(labels[found[0] - 1])
-                           : std::to_string(found.size()) + " labels";
+  if (last == nullptr) return "no label";
+  return count == 1 ? title_of(*last) : std::to_string(count) + " labels";
 }
 
 void encode_labels(const LabelledSurface& surface, const FileContent& content,

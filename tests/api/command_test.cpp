@@ -197,6 +197,10 @@ TEST_F(CommandTest, AnObjOfLabelsHasItsMaterialsBesideIt) {
   EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, LPS\nmtllib x.mtl\no label_1\nv "));
   const std::string materials = read_file(folder_ / "out/x.mtl");
   EXPECT_THAT(materials, HasSubstr("newmtl label_2\nKd 1.000000 0.000000 0.501961\n"));
+  EXPECT_THAT(made.output, HasSubstr("/out/x.mtl\n"));
+  const Finished told = command("--json " + mesh + "--labels all -o @out/x.obj");
+  EXPECT_THAT(told.output, HasSubstr("/out/x.mtl\"]"));
+  command("--quiet " + mesh + "--labels all --label-color 2=#ff0080 -o @out/x.obj");
   // Nothing else of the file changes, and standard output gets it as the server has it.
   const Finished printed =
       command("--quiet " + mesh + "--labels all --label-color 2=#ff0080 -o - --format obj");

@@ -1,6 +1,7 @@
 // Jobs by labels over HTTP: from the list of a volume's labels to one label's own file.
 #include <cmath>
 #include <cstring>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -144,7 +145,14 @@ TEST_F(LabelsTest, TheMaterialsOfAnObjAreBesideIt) {
   EXPECT_THAT(materials.header("content-disposition"), HasSubstr("mesh.mtl"));
   EXPECT_THAT(materials.body, HasSubstr("newmtl label_3\nKd 0."));
   EXPECT_THAT(materials.body, HasSubstr("newmtl Right_side\nKd 1.000000 0.000000 0.501961\n"));
-  EXPECT_EQ(mesh(job, "mtl", {{"If-None-Match", materials.header("etag")}}).status, 304);
+  const Answer same = mesh(job, "mtl", {{"If-None-Match", materials.header("etag")}});
+  EXPECT_EQ(same.status, 304);
+  EXPECT_EQ(same.header("content-disposition"), "");
+  const Answer head = daemon_.send("HEAD", "/v1/jobs/" + job.id + "/mesh.mtl");
+  EXPECT_EQ(head.status, 200);
+  EXPECT_EQ(head.body, "");
+  EXPECT_EQ(head.header("content-length"), std::to_string(materials.body.size()));
+  EXPECT_EQ(head.header("etag"), materials.header("etag"));
   EXPECT_THAT(mesh(job, "obj").body, HasSubstr("\nmtllib mesh.mtl\n"));
   const Job surface = finished_job(daemon_);
   EXPECT_EQ(mesh(surface, "mtl").status, 200);
@@ -301,6 +309,25 @@ TEST_F(ManyLabelsTest, MakeNoAnswerLong) {
   }
   const json mesh = json::parse(daemon_.get("/v1/jobs/" + job_.id).body)["mesh"];
   EXPECT_FALSE(mesh.contains("labels"));
+}
+
+TEST_F(ManyLabelsTest, HaveTheMaterialsThatTheirObjUses) {
+  const Answer asked =
+      post(R"("labels": "all", "formats": ["obj"], "label_names": {"700": "x", "900": "x"})",
+           job_.parameters.volume);
+  ASSERT_EQ(asked.status, 202) << asked.body;
+  const Job job = daemon_.client().wait(job_from_json(asked.body).id);
+  const auto names_after = [](const std::string& key, const std::string& text) {
+    std::vector<std::string> names;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with(key)) names.push_back(line.substr(key.size()));
+    }
+    return names;
+  };
+  const auto made = names_after("newmtl ", mesh(job, "mtl").body);
+  EXPECT_EQ(std::ssize(made), kLabels);
+  EXPECT_EQ(made, names_after("usemtl ", mesh(job, "obj").body));
 }
 
 TEST_F(ManyLabelsTest, HaveFilesOfTheirOwn) {

@@ -129,8 +129,9 @@ TEST_F(TokensTest, ATokenSeesItsOwnAloneAndAnAdministratorAll) {
   const std::string of_job = "/v1/jobs/" + job.id;
   const std::string of_volume = "/v1/volumes/" + parameters.volume;
   for (const std::string& path :
-       {of_job, of_job + "/mesh.drc", of_job + "/events", of_volume, of_volume + "/histogram",
-        of_volume + "/labels", of_volume + "/slice.png", of_volume + "/preview"}) {
+       {of_job, of_job + "/mesh.drc", of_job + "/mesh.mtl", of_job + "/events", of_volume,
+        of_volume + "/histogram", of_volume + "/labels", of_volume + "/slice.png",
+        of_volume + "/preview"}) {
     EXPECT_TRUE(is_problem(daemon_.get(path, bearer(mr_)), ErrorCode::kNotFound)) << path;
     EXPECT_EQ(daemon_.get(path, bearer(ct_)).status, 200) << path;
     EXPECT_EQ(daemon_.get(path, bearer(boss_)).status, 200) << path;

@@ -2,11 +2,13 @@
 
 import json
 import os
+import re
 import subprocess
 import signal
 import threading
 import time
 import unittest
+import urllib.request
 from unittest import mock
 
 import isomesh
@@ -301,6 +303,22 @@ class Connections(DaemonTest):
         self.assertNotIn(b"Range:", requests[0])
         self.assertRegex(requests[1], rb"Range: bytes=\d{5}")
         self.assertEqual(len(requests), 3)
+
+    def test_an_obj_names_its_materials_if_it_breaks_in_its_head(self):
+        samples = numpy.zeros((12, 12, 12), "uint8")
+        samples[2:6, 2:10, 2:10] = 3
+        job = self.client.mesh(samples, labels="all", formats=["obj"]).job
+        whole = self.client.download(job, self.folder / "a.obj").read_bytes()
+        with Relay(self.url, cuts=0, after=0) as relay:
+            head = urllib.request.urlopen(f"{relay.url}/v1/jobs/{job['id']}/mesh.obj")
+            sizes = len(f"HTTP/1.1 200 OK\r\n{head.headers}".replace("\r\n", "\n").replace("\n", "\r\n"))
+        with Relay(self.url, cuts=2, after=sizes + 40) as relay:
+            target = isomesh.Client(relay.url).download(job, self.folder / "left hip.obj")
+        starts = [re.search(rb"Range: bytes=(\d+)-", each) for each in relay.requests if b"mesh.obj" in each]
+        self.assertEqual(len(starts), 3)
+        self.assertLess(int(starts[1][1]), 100)
+        self.assertEqual(target.read_bytes(), whole.replace(b"mtllib a.mtl", b"mtllib left_hip.mtl"))
+        self.assertIn("newmtl label_3", (self.folder / "left_hip.mtl").read_text())
 
     def test_a_connection_that_breaks_each_time_is_given_up(self):
         job = self.client.mesh(ball(), iso=-8).job

@@ -251,8 +251,16 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         mesh.colors = mesh.colors[1:]
         with self.assertRaisesRegex(ValueError, "colors for .* vertices; set colors to None"):
             mesh.save(plain)
+        mesh.colors = numpy.full(mesh.vertices.shape, 256)
+        with self.assertRaisesRegex(ValueError, "colors must be from 0 to 255"):
+            mesh.save(plain)
+        mesh.colors = numpy.full(mesh.vertices.shape, 0.5)
+        with self.assertRaisesRegex(ValueError, "colors must be integers from 0 to 255"):
+            mesh.save(plain)
+        # Without colours a label is a property of faces, as in the server's files before they had colours.
         mesh.colors = None
         self.assertIsNone(isomesh.read_ply(mesh.save(plain)).colors)
+        self.assertIn(b"property list uchar uint vertex_indices\nproperty int label\nend_header\n", plain.read_bytes())
         self.assertEqual(isomesh.read_ply(plain).labels.tolist(), mesh.labels.tolist())
 
     def test_an_obj_of_labels_has_its_materials_beside_it(self):

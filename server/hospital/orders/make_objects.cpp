@@ -35,15 +35,6 @@ struct Document {
   std::uint64_t size() const { return text.size() + bytes; }
 };
 
-template <class Function>
-void for_each_label(const Job& job, const store::BlobStore& blobs, Function&& function) {
-  const jobs::JobLabels labels(job, blobs);
-  std::vector<LabelSummary> page = labels.after(std::nullopt);
-  for (; !page.empty(); page = labels.after(page.back().label)) {
-    for (const LabelSummary& label : page) function(label);
-  }
-}
-
 std::vector<Document> stl_documents(const Job& job, const store::BlobStore& blobs) {
   std::vector<Document> documents;
   const auto& stored = job.mesh->files;
@@ -53,7 +44,7 @@ std::vector<Document> stl_documents(const Job& job, const store::BlobStore& blob
   }
   const auto zip = stored.find(MeshFormat::kZip);
   if (zip == stored.end()) return documents;
-  for_each_label(job, blobs, [&](const LabelSummary& label) {
+  jobs::JobLabels(job, blobs).for_each([&](const LabelSummary& label) {
     const auto stl = label.files.find(MeshFormat::kStl);
     if (stl == label.files.end() || label.triangles == 0) return;
     documents.push_back({.label = label.label,

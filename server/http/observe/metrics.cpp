@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 #include "proto/fields.h"
-#include "server/jobs/queue/pipeline.h"
+#include "server/codec/mesher_version.h"
 
 namespace isomesh::http {
 namespace {
@@ -170,7 +170,7 @@ struct Metrics::State {
 
 Metrics::Metrics() : state_(std::make_unique<State>()) {
   state_->gauge("isomesh_build_info", "Running version as a label; always 1")
-      .Add({{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}})
+      .Add({{"version", ISOMESH_VERSION}, {"mesher", codec::kMesherVersion}})
       .Set(1);
   // Register counters at 0, because rates need a first sample.
   for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));

@@ -218,10 +218,10 @@ void answer_materials(const App& app, const Request& request, Response& response
   check_known(request, {});
   const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
   check_has_mesh(job);
-  const std::string materials = jobs::materials_of(labels_of(app, job));
+  answer_tagged(request, response, jobs::materials_of(labels_of(app, job)), "model/mtl");
+  if (response.status != 200) return;
   response.set_header("Content-Disposition",
                       "attachment; filename=\"" + std::string(kMaterialsName) + '"');
-  answer_tagged(request, response, materials, "model/mtl");
 }
 
 }  // namespace

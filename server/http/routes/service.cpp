@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/json_values.h"
+#include "server/codec/mesher_version.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/openapi.h"
 #include "server/http/routes/routes.h"
-#include "server/jobs/queue/pipeline.h"
 
 namespace isomesh::http {
 namespace {
@@ -53,7 +53,7 @@ void add_service_routes(App& app) {
     const bool takes_orders = app.services.wing != nullptr && app.services.wing->is_open();
     JsonTree version;
     json_values::write_field(version.root(), "version", std::string(ISOMESH_VERSION));
-    json_values::write_field(version.root(), "mesher", std::string(jobs::kMesherVersion));
+    json_values::write_field(version.root(), "mesher", std::string(codec::kMesherVersion));
     json_values::write_field(version.root(), "orders", takes_orders);
     response.set_body(dump(version.root()), "application/json");
   });

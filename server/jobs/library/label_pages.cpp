@@ -147,6 +147,11 @@ bool JobLabels::has_after(std::int64_t last) const {
   return file_ ? page_of(last) + 1 < pages_.size() : job_.mesh->labels.back().label > last;
 }
 
+void JobLabels::for_each(const std::function<void(const LabelSummary& label)>& visit) const {
+  if (!file_) std::ranges::for_each(job_.mesh->labels, visit);
+  for (std::size_t n = 0; n < pages_.size(); ++n) std::ranges::for_each(page(n), visit);
+}
+
 std::optional<LabelSummary> JobLabels::find(std::int64_t label) const {
   const auto found_in = [&](const std::vector<LabelSummary>& labels) {
     const auto found = std::ranges::lower_bound(labels, label, {}, &LabelSummary::label);
@@ -159,10 +164,8 @@ std::optional<LabelSummary> JobLabels::find(std::int64_t label) const {
 std::string materials_of(const JobLabels& labels) {
   std::string text;
   codec::ObjGroups groups;
-  std::vector<LabelSummary> page = labels.after(std::nullopt);
-  for (; !page.empty(); page = labels.after(page.back().label)) {
-    for (const LabelSummary& label : page) text += codec::mtl_material(groups.of(label), label);
-  }
+  labels.for_each(
+      [&](const LabelSummary& label) { text += codec::mtl_material(groups.of(label), label); });
   return text;
 }
 

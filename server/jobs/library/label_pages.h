@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -38,6 +39,10 @@ class JobLabels {
 
   // True if more labels follow the last one that after() returned. Reads nothing.
   bool has_after(std::int64_t last) const;
+
+  // Calls `visit` for each label, ascending, and reads each page once. Their files may have no
+  // addresses.
+  void for_each(const std::function<void(const LabelSummary& label)>& visit) const;
 
   // Empty if the job has no such label. Its files may have no addresses.
   std::optional<LabelSummary> find(std::int64_t label) const;

@@ -22,12 +22,8 @@ struct PipelineLimits {
   std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job
 };
 
-// A part of the key of a result. Increment whenever the same volume and parameters would give
-// different bytes than before.
-inline constexpr const char* kMesherVersion = "2";
-
-// Increment with kMesherVersion, and whenever jobs can ask for something new: in an upgrade, the
-// older daemons that share the queue leave newer jobs to newer daemons.
+// Increment with codec::kMesherVersion, and whenever jobs can ask for something new: in an upgrade,
+// the older daemons that share the queue leave newer jobs to newer daemons.
 inline constexpr int kJobVersion = 2;
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the

@@ -82,6 +82,19 @@ TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
   const std::string report = mesh_report(mesh);
   EXPECT_THAT(report, HasSubstr("volume          none: the surface is open; --close"));
   EXPECT_THAT(report, Not(HasSubstr("1,234.5")));
+  mesh.quality.closed = true;
+  EXPECT_THAT(
+      mesh_report(mesh),
+      HasSubstr("volume          none: the triangles disagree about which side is outside"));
+}
+
+TEST(MeshReport, SaysThatALabelThatIsNotOrientedEnclosesNothing) {
+  MeshSummary mesh;
+  mesh.labels = {{.label = 1, .closed = true, .oriented = false, .volume_mm3 = 27}};
+  const std::string report = mesh_report(mesh);
+  EXPECT_THAT(report, HasSubstr(" none "));
+  EXPECT_THAT(report, Not(HasSubstr("open label")));
+  EXPECT_THAT(report, HasSubstr("A label that is not oriented encloses no volume: "));
 }
 
 // The sum over the triangles of an open surface may even be negative.

@@ -129,7 +129,7 @@ httplib::Server::Handler answering(const std::string& body, const std::string& t
   };
 }
 
-Job finished_job(const std::string& id, const std::string& mesh_bytes) {
+Job finished_job(const std::string& id, const std::string& mesh_bytes, MeshFormat format) {
   Sha256 sha256;
   sha256.update(mesh_bytes);
   Job job;
@@ -140,9 +140,10 @@ Job finished_job(const std::string& id, const std::string& mesh_bytes) {
   job.created = "2024-05-01T10:00:00Z";
   job.parameters.volume = "abc";
   job.parameters.iso = 60;
-  job.mesh.emplace().files[MeshFormat::kDrc] = {.bytes = mesh_bytes.size(),
-                                                .sha256 = to_hex(sha256.finish()),
-                                                .href = "/v1/jobs/" + id + "/mesh.drc"};
+  job.mesh.emplace().files[format] = {
+      .bytes = mesh_bytes.size(),
+      .sha256 = to_hex(sha256.finish()),
+      .href = "/v1/jobs/" + id + "/mesh." + std::string(to_string(format))};
   return job;
 }
 

@@ -80,8 +80,9 @@ void answer_with(httplib::Response& response, const Error& error);
 httplib::Server::Handler answering(const std::string& body,
                                    const std::string& type = "application/json");
 
-// A job that has succeeded with one Draco file of these bytes.
-Job finished_job(const std::string& id, const std::string& mesh_bytes);
+// A job that has succeeded with one file of these bytes.
+Job finished_job(const std::string& id, const std::string& mesh_bytes,
+                 MeshFormat format = MeshFormat::kDrc);
 
 // The options of the command with these arguments.
 cli::Options options_from(const std::vector<std::string>& words);

@@ -371,6 +371,57 @@ TEST_F(Fetch, GoesOnWhereTheConnectionBrokeOrStartsOver) {
   }
 }
 
+// The name of the materials is replaced in these bytes, which wait until they are complete.
+TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
+  const std::string line = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
+  for (const std::size_t size : {60U, 100U, 101U, 5000U}) {
+    const std::string mesh = line + std::string(size - line.size(), '#');
+    for (const bool knows_ranges : {true, false}) {
+      int asked = 0;
+      const test::SocketServer server([&](int socket) {
+        const std::string head = test::read_head(socket);
+        if (head.find("mesh.mtl") != std::string::npos) {
+          return test::answer(socket, "200 OK", "newmtl a\n");
+        }
+        if (head.find("mesh.obj") == std::string::npos) {
+          return test::answer(socket, "200 OK", to_json(finished_job("7", mesh, MeshFormat::kObj)));
+        }
+        const std::size_t at = head.find("Range: bytes=");
+        const bool is_range = knows_ranges && at != std::string::npos;
+        const std::string rest = mesh.substr(is_range ? std::stoul(head.substr(at + 13)) : 0);
+        test::send_text(socket, std::string("HTTP/1.1 ") +
+                                    (is_range ? "206 Partial Content" : "200 OK") +
+                                    "\r\nContent-Length: " + std::to_string(rest.size()) +
+                                    "\r\n\r\n" + rest.substr(0, ++asked < 3 ? 20 : -1));
+      });
+      Client({.server = server.url()}).fetch("7", MeshFormat::kObj, folder_ / "left hip.obj");
+      std::string expected = mesh;
+      expected.replace(expected.find("mesh.mtl"), 8, "left_hip.mtl");
+      EXPECT_EQ(test::read_file(folder_ / "left hip.obj"), expected);
+      EXPECT_EQ(test::read_file(folder_ / "left_hip.mtl"), "newmtl a\n");
+      EXPECT_EQ(asked, 3);
+    }
+  }
+}
+
+TEST_F(Fetch, PutsTheMaterialsBesideTheFileBehindALink) {
+  const std::string mesh = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
+  server_.http.Get("/v1/jobs/7",
+                   test::answering(to_json(finished_job("7", mesh, MeshFormat::kObj))));
+  server_.http.Get("/v1/jobs/7/mesh.obj", test::answering(mesh, "model/obj"));
+  server_.http.Get("/v1/jobs/7/mesh.mtl", test::answering("newmtl a\n", "model/mtl"));
+  Client client({.server = server_.start()});
+  std::filesystem::create_directory(folder_ / "far");
+  std::filesystem::create_symlink("far/real.obj", folder_ / "x.obj");
+  client.fetch("7", MeshFormat::kObj, folder_ / "x.obj");
+  EXPECT_THAT(test::read_file(folder_ / "far/real.obj"), HasSubstr("\nmtllib real.mtl\n"));
+  EXPECT_EQ(test::read_file(folder_ / "far/real.mtl"), "newmtl a\n");
+  // A file of another suffix keeps the server's bytes.
+  client.fetch("7", MeshFormat::kObj, folder_ / "mesh");
+  EXPECT_EQ(test::read_file(folder_ / "mesh"), mesh);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "mesh.mtl"));
+}
+
 TEST_F(Fetch, NamesATargetThatCannotBeWritten) {
   Client client = client_for("mesh", "mesh");
   const auto target = folder_ / "missing" / "brain.drc";

@@ -24,7 +24,7 @@ struct Object3mf {
 struct Model3mf {
   bool is_in_millimetres = false;
   std::map<std::string, std::string> metadata;
-  std::size_t items = 0;           // of the build
+  std::size_t items = 0;           // the build's
   std::string together;            // the name of an object that has components
   std::vector<Object3mf> objects;  // that are built, with a mesh, in their order
 };

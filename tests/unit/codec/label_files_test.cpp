@@ -176,6 +176,7 @@ TEST_F(LabelFilesTest, GlbHasANodeWithNameColourAndFiguresForEachLabel) {
     EXPECT_EQ(node["name"], title_of(labels_[n]));
     EXPECT_EQ(node["extras"]["label"], labels_[n].label);
     EXPECT_EQ(node["extras"]["voxels"], labels_[n].voxels);
+    ASSERT_TRUE(labels_[n].encloses_volume());
     EXPECT_EQ(node["extras"]["volume_mm3"], labels_[n].volume_mm3);
     EXPECT_EQ(node["extras"]["area_mm2"], labels_[n].area_mm2);
     EXPECT_EQ(gltf["meshes"][node["mesh"].get<std::size_t>()]["name"], node["name"]);
@@ -188,6 +189,21 @@ TEST_F(LabelFilesTest, GlbHasANodeWithNameColourAndFiguresForEachLabel) {
   EXPECT_NE(gltf["materials"][0]["pbrMetallicRoughness"],
             gltf["materials"][2]["pbrMetallicRoughness"]);
   EXPECT_FALSE(gltf["asset"]["extras"].contains("iso"));
+}
+
+TEST_F(LabelFilesTest, GlbHasNoVolumeOfAnOpenLabel) {
+  labels_[1].closed = false;
+  const auto nodes = test::open_container(encoded(MeshFormat::kGlb)).document["nodes"];
+  for (const auto& node : nodes) {
+    if (!node.contains("extras")) continue;
+    EXPECT_EQ(node["extras"].contains("volume_mm3"), node["extras"]["label"] != 2) << node;
+    EXPECT_TRUE(node["extras"].contains("area_mm2"));
+  }
+}
+
+TEST_F(LabelFilesTest, PlyNumbersTheVerticesThatTheJobReports) {
+  ++labels_[1].vertices;
+  EXPECT_THROW(encoded(MeshFormat::kPly), Error);
 }
 
 TEST_F(LabelFilesTest, GlbIsValidAndItsWallsAreShared) {
@@ -218,7 +234,9 @@ TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
   EXPECT_EQ(unzipped(zipped({MeshFormat::kStl}).bytes).at("label 3.stl").size(), 84U);
   EXPECT_NE(encoded(MeshFormat::kPly).find("element face 0"), std::string::npos);
   EXPECT_EQ(encoded(MeshFormat::kObj), "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n");
-  EXPECT_TRUE(test::read_with_lib3mf(encoded(MeshFormat::k3mf)).objects.empty());
+  const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
+  EXPECT_TRUE(model.objects.empty());
+  EXPECT_EQ(model.metadata.at("Title"), "no label");
 }
 
 // Some readers fail at a property of faces beside the list of their vertices.

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/codec/formats.h"
+#include "server/codec/mesher_version.h"
 #include "tests/unit/codec/foreign_3mf.h"
 #include "tests/unit/codec/meshes.h"
 
@@ -73,7 +74,7 @@ TEST(ThreeMf, SaysWhereItComesFrom) {
   provenance.notes = {{"code", "Less than < & \"quotes\""}};
   const Model3mf model = read_with_lib3mf(
       encoded(test::meshes_to_encode().front().mesh, MeshFormat::k3mf, provenance));
-  EXPECT_THAT(model.metadata.at("Application"), testing::MatchesRegex("isomesh [0-9.]+"));
+  EXPECT_EQ(model.metadata.at("Application"), std::string("isomesh, mesher ") + kMesherVersion);
   std::string text;
   for (const auto& [key, value] : model.metadata) {
     if (key.ends_with("provenance")) text = value;

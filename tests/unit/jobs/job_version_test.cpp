@@ -6,6 +6,7 @@
 
 #include "base/sha256.h"
 #include "proto/parameters.h"
+#include "server/codec/mesher_version.h"
 #include "server/jobs/queue/pipeline.h"
 
 namespace isomesh::jobs {
@@ -22,7 +23,7 @@ void add_values(std::string& all, const T& /*member*/) {
 
 // All that a job can ask for, and how it is made.
 std::string job_language() {
-  std::string all = kMesherVersion;
+  std::string all = codec::kMesherVersion;
   JobParameters parameters;
   visit_leaves(parameters, [&](const std::string& path, const Parameter&, auto& member) {
     all += '\n' + path + ' ';

@@ -70,6 +70,10 @@ describe('a job by labels', () => {
     expect(text).not.toContain('--iso');
     expect(text).toContain('-o mesh.glb -o mesh.zip');
     expect(curlSnippet('http://h:1', named, false)).toContain('JOB/mesh.zip');
+    expect(curlSnippet('http://h:1', { ...named, formats: ['obj'] }, false)).toContain('-o mesh.mtl http://h:1/v1/jobs/JOB/mesh.mtl');
+    const surface = curlSnippet('http://h:1', { ...defaultParameters('v', 1), formats: ['obj', 'gii'] }, false);
+    expect(surface).toContain('-o mesh.surf.gii http://h:1/v1/jobs/JOB/mesh.gii');
+    expect(surface).not.toContain('mesh.mtl');
     expect(commandSnippet('http://h:1', { ...all, regularize: false }, false)).toContain('--no-regularize');
   });
 

@@ -346,7 +346,7 @@ class Client:
         """Writes a file of the job to `path` and returns that path. The suffix selects the format.
         `label` selects one label's own surface. The file appears only when it is complete and matches
         the job's SHA-256. An OBJ of all labels gets its materials beside it: for `x.obj` the file
-        `x.mtl`, whose name replaces that in the OBJ."""
+        `x.mtl`, whose name replaces that in the OBJ. In that name, `_` stands for blanks and backslashes."""
         target = Path(path)
         done = self.job(job) if isinstance(job, str) else job
         form = format_of(target)
@@ -354,15 +354,15 @@ class Client:
         if label is not None and done["mesh"] is not None:
             labels = done["mesh"].get("labels") or self.job_labels(done)
         announced = file_of(done, form, label, labels)
+        # Readers take several names from the line, divided by blanks, and control characters end it.
+        beside = target.with_name(re.sub(r"[\0-\x20\\]", "_", target.with_suffix(".mtl").name))
         with written(target) as file:
-
-            def write(at: int, piece: bytes) -> None:
-                file.seek(at)
-                file.write(piece)
-
-            self._exchange.download(announced, write)
-            if form == "obj":
-                self._add_materials(done["id"], file, target)
+            arriving = _Arriving(file, os.fsencode(beside.name) if form == "obj" else None)
+            self._exchange.download(announced, arriving.write)
+            arriving.finish()
+            if arriving.names_materials:
+                with written(beside) as materials:
+                    materials.write(self._exchange.text(f"{_job_path(done)}/mesh.mtl"))
         return target
 
     # --- How -------------------------------------------------------------------------------------
@@ -416,25 +416,43 @@ class Client:
         key = idempotency_key or uuid.uuid4().hex
         return cast("api.Job", self._exchange.send_json("POST", "/v1/jobs", value, answers.JOB, key))
 
-    def _add_materials(self, job: str, obj: IO[bytes], target: Path) -> None:
-        """Writes the materials that an OBJ names beside it, and gives their name to the OBJ."""
-        obj.seek(0)
-        head, line = obj.read(_LONGEST_OBJ_HEAD), b"\nmtllib mesh.mtl\n"
-        if line not in head:
-            return
-        # Readers end the name at a blank, and some change a backslash.
-        beside = target.with_name(re.sub(r"[\0- \\]", "_", target.with_suffix(".mtl").name))
-        with written(beside) as file:
-            file.write(self._exchange.text(f"/v1/jobs/{quote(job, safe='')}/mesh.mtl"))
-        text = head.replace(line, b"\nmtllib " + os.fsencode(beside.name) + b"\n", 1) + obj.read()
-        obj.seek(0)
-        obj.write(text)
-        obj.truncate()
-
     def _fetch(self, job: api.SucceededJob, notes: Sequence[api.Note]) -> Mesh:
         data = bytearray()
         self._exchange.download(file_of(job, "ply"), lambda at, piece: _put(data, at, piece))
         return Mesh(**ply.parse(data), job=job, notes=notes, download=self.download)
+
+
+class _Arriving:
+    """A file on its way to disk. In an OBJ, `materials` replaces the name of the file of materials: the first bytes
+    wait until the line that has it is complete."""
+
+    def __init__(self, file: IO[bytes], materials: Optional[bytes]) -> None:
+        self.names_materials = False
+        self._file, self._materials, self._head = file, materials, b""
+
+    def write(self, at: int, piece: bytes) -> None:
+        if at == 0:
+            self._head, self.names_materials = b"", False
+            self._file.seek(0)
+            self._file.truncate()
+        missing = _LONGEST_OBJ_HEAD - len(self._head)
+        if missing > 0:
+            self._head += piece[:missing]
+            if len(self._head) == _LONGEST_OBJ_HEAD:
+                self._write_head()
+        self._file.write(piece[missing:])
+
+    def finish(self) -> None:
+        if len(self._head) < _LONGEST_OBJ_HEAD:
+            self._write_head()
+
+    def _write_head(self) -> None:
+        line, head = b"\nmtllib mesh.mtl\n", self._head
+        self.names_materials = self._materials is not None and line in head
+        if self._materials is not None:
+            head = head.replace(line, b"\nmtllib " + self._materials + b"\n", 1)
+        self._file.write(head)
+
 
 _UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form")
 

@@ -1,7 +1,7 @@
 """isomesh's PLY files: binary, little-endian, with float coordinates and three corners per face.
 
-A label is a property of vertices, because each label has vertices of its own. Arrays whose labels share vertices have it
-as a property of faces."""
+A label is a property of vertices, because each label has vertices of its own. Arrays whose labels share vertices, or
+without colours, have it as a property of faces, as the server's files had it before they had colours."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LABEL = {"i": "property int label\n", "I": "property uint label\n"}
 class _Header(NamedTuple):
     vertices: int
     faces: int
-    begin: int  # of the vertices
+    begin: int  # where the vertices begin
     space: str
     has_colors: bool
     label_of: str  # the element that has labels: "vertex", "face" or "" for none
@@ -69,7 +69,7 @@ def pieces(vertices: Any, faces: Any, labels: Any, colors: Any, space: str) -> I
     if colors is not None:
         if len(colors) != len(vertices):
             raise ValueError(f"there are {len(colors)} colors for {len(vertices)} vertices; set colors to None to save none")
-        of_vertex.append((_bytes_of("colors", colors, "B", 3), 3))
+        of_vertex.append((_bytes_of("colors", colors, "B", 3, below=256), 3))
         vertex += _COLOR
     labels, long_labels = _numbered(labels)
     if labels is not None:
@@ -77,7 +77,7 @@ def pieces(vertices: Any, faces: Any, labels: Any, colors: Any, space: str) -> I
         values = _bytes_of("labels", labels, kind)
         if len(labels) != len(faces):
             raise ValueError(f"there are {len(labels)} labels for {len(faces)} faces")
-        labels_of_vertices = _of_vertices(values, corners, len(vertices))
+        labels_of_vertices = None if colors is None else _of_vertices(values, corners, len(vertices))
         if labels_of_vertices is None:
             of_face.append((values, 4))
             face += _LABEL[kind]
@@ -184,7 +184,7 @@ def _header_of(text: bytes) -> _Header:
             properties[list(properties)[-1]] += line + "\n"
     vertex, face = properties.get("vertex", ""), properties.get("face", "")
     has_colors = vertex.startswith(_POSITION + _COLOR)
-    # What is left are labels.
+    # Labels are the only other property.
     rest = {"vertex": vertex[len(_POSITION) + (len(_COLOR) if has_colors else 0) :], "face": face[len(_CORNERS) :]}
     labels = [(element, kind) for element in rest for kind, name in _LABEL.items() if rest[element] == name]
     is_ours = vertex.startswith(_POSITION) and face.startswith(_CORNERS) and list(counts) == ["vertex", "face"]
@@ -244,6 +244,8 @@ def _bytes_of(name: str, values: Any, kind: str, *columns: int, below: Optional[
     found = numpy.asarray(values)
     if found.ndim != 1 + len(columns) or found.shape[1:] != columns:
         raise ValueError(f"{name} must have the shape {('n', *columns)}, and has the shape {found.shape}")
+    if kind == "B" and found.dtype.kind not in "iu":
+        raise ValueError(f"{name} must be integers from 0 to 255, and are of the type {found.dtype}")
     if below is not None and found.size and not (0 <= found.min() and found.max() < below):
         raise ValueError(f"{name} must be from 0 to {below - 1}, and are from {found.min()} to {found.max()}")
     return found.astype(numpy.dtype(kind).newbyteorder("<")).tobytes()

@@ -1,10 +1,15 @@
 // How to do the same without the page.
 import type { JobParameters } from '../api/types';
+import { meshFileSuffix } from '../ui/format';
 import { filesOf, jobRequest, toSay } from './parameters';
-import { asText, valueIn, type ByLabel, type Parameter, type Places } from './table';
+import { asText, isByLabels, valueIn, type ByLabel, type Parameter, type Places } from './table';
 
 function quoted(text: string): string {
   return /^[A-Za-z0-9_./:=,-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
+}
+
+function fileName(format: string): string {
+  return `mesh.${meshFileSuffix(format)}`;
 }
 
 export function curlSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
@@ -13,9 +18,11 @@ export function curlSnippet(origin: string, job: JobParameters, hasToken: boolea
   lines.push(`-H 'Content-Type: application/json'`);
   lines.push(`-d ${quoted(JSON.stringify(jobRequest(job)))}`);
   const auth = hasToken ? ' -H "Authorization: Bearer $ISOMESH_TOKEN"' : '';
-  const downloads = filesOf(job).map(
-    (format) => `curl${auth} -o mesh.${format} ${quoted(`${origin}/v1/jobs/`)}JOB/mesh.${format}`,
-  );
+  const line = (name: string, format: string): string =>
+    `curl${auth} -o ${name} ${quoted(`${origin}/v1/jobs/`)}JOB/mesh.${format}`;
+  const downloads = filesOf(job).map((format) => line(fileName(format), format));
+  // An OBJ of labels names the file of its colours.
+  if (isByLabels(job) && filesOf(job).includes('obj')) downloads.push(line('mesh.mtl', 'mtl'));
   return [`${lines.join(' \\\n  ')}`, '# JOB is the id in the answer', ...downloads].join('\n');
 }
 
@@ -38,7 +45,7 @@ export function commandSnippet(origin: string, job: JobParameters, hasToken: boo
   const options = toSay(job)
     .filter(({ name }) => name !== 'volume')
     .map((parameter) => optionFor(parameter, job));
-  const fetched = filesOf(job).map((format) => `-o mesh.${format}`).join(' ');
+  const fetched = filesOf(job).map((format) => `-o ${fileName(format)}`).join(' ');
   return [
     `job=$(${isomesh} submit ${job.volume} \\`,
     `  ${options.join(' ')})`,
@@ -55,7 +62,7 @@ function enumeratorOf(name: string): string {
 export function librarySnippet(origin: string, job: JobParameters, hasToken: boolean): string {
   const token = hasToken ? ', .token = std::getenv("ISOMESH_TOKEN")' : '';
   const fetched = filesOf(job).map(
-    (format) => `client.fetch(job.id, isomesh::MeshFormat::${enumeratorOf(format)}, "mesh.${format}");`,
+    (format) => `client.fetch(job.id, isomesh::MeshFormat::${enumeratorOf(format)}, "${fileName(format)}");`,
   );
   return [
     `isomesh::Client client({.server = ${JSON.stringify(origin)}${token}});`,

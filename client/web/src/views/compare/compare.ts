@@ -13,6 +13,7 @@ import { refusal } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { KnownVolumes } from '../../volume/known';
+import { noVolumeText } from '../jobs/certificate';
 import { distributionChart } from '../jobs/charts';
 import { styleOfText, styleToText } from '../surface/look_text';
 import { SurfacePane } from '../surface/surface_pane';
@@ -31,7 +32,7 @@ function numbersOf(job: Job): HTMLElement {
   if (change) volume.push([change.title, `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`]);
   const rows: [string, string][] = [
     ['Triangles', formatCount(mesh.triangles)],
-    ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: the surface is open'] as [string, string]]),
+    ...(mesh.quality.encloses_volume ? volume : [['Volume', noVolumeText(mesh.quality)] as [string, string]]),
     // An equal job's files were there already.
     ['Time', work < 1 ? 'already made' : formatMilliseconds(work)],
   ];

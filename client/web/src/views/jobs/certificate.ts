@@ -109,11 +109,16 @@ export function intersectionsText({ quality }: MeshSummary): Child {
   return h('span.attention', { title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
 }
 
+// The reason why a surface encloses no volume.
+export function noVolumeText({ closed }: { closed: boolean }): string {
+  return closed ? 'none: the triangles disagree about which side is outside' : 'none: the surface is open';
+}
+
 // For a surface whose volume would be a number without a meaning.
 export function openText({ parameters, mesh }: Job, make: MakeVariant): Child {
-  if (mesh?.quality.closed) return h('span.attention', 'none: the triangles disagree about which side is outside');
+  if (mesh?.quality.closed) return h('span.attention', noVolumeText(mesh.quality));
   return h('span.attention', [
-    'none: the surface is open. ',
+    `${noVolumeText({ closed: false })}. `,
     !parameters.close && button('Close it', () => make({ close: true }), { class: 'link', title: 'Starts a job that closes the surface at the border of the volume' }),
   ]);
 }

@@ -153,7 +153,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
         button(
           'Colours of the OBJ',
           () => void saveFile(`/v1/jobs/${job.id}/mesh.mtl`, 'mesh.mtl', 0).catch(tellError),
-          { 'data-format': 'mtl', title: 'Save it as mesh.mtl beside the OBJ, which names it so' },
+          { 'data-format': 'mtl', title: 'Save it as mesh.mtl beside the OBJ, which names it so. Each OBJ needs a folder of its own for the two' },
         ),
     ]),
     missing.length > 0 &&

@@ -10,9 +10,10 @@ import type { Scope } from '../../ui/signal';
 import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
 
-// An open label encloses nothing: the sum over its triangles is no volume.
+// Unless a label is closed and oriented, the sum over its triangles is no volume.
 export function volumeText({ closed, oriented, volume_mm3: volume }: LabelSummary): string {
-  return closed && oriented ? `${formatValue(volume)} mm\u00b3` : 'none (open)';
+  if (closed && oriented) return `${formatValue(volume)} mm\u00b3`;
+  return closed ? 'none (not oriented)' : 'none (open)';
 }
 
 export function areaText({ area_mm2: area }: LabelSummary): string {
