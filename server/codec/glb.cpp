@@ -235,12 +235,10 @@ void add_levels(const WallLevel& walls, double share, const Grid& grid,
   });
 }
 
-// The walls of a coarser level.
-struct CoarseWalls {
-  explicit CoarseWalls(const mesh::SeparatingSurface& coarse)
-      : walls(copy_of(coarse)), triangles(walls) {}
+// A coarser level, which may live no longer than its walls.
+struct CoarseLevel {
+  explicit CoarseLevel(const mesh::SeparatingSurface& walls) : triangles(walls) {}
 
-  mesh::SeparatingSurface walls;
   mesh::LabelTriangles triangles;
   std::optional<WallLevel> level = {};
 };
@@ -260,14 +258,17 @@ void encode_labels(const LabelledSurface& surface, const Provenance& provenance,
   add_levels(finest, 1, grid, parameters, LevelProgress(context, parameters, 0).encode, parts);
   mesh::SeparatingSurface coarse;
   if (!shares.empty()) coarse = copy_of(surface.walls);
-  std::deque<CoarseWalls> kept;  // plain files are written from all of them
+  // Plain files are written from the walls of all levels.
+  std::deque<mesh::SeparatingSurface> walls;
+  std::deque<CoarseLevel> kept;
   for (std::size_t n = 0; n < shares.size(); ++n) {
     const LevelProgress progress(context, parameters, n + 1);
     coarsen(count_of(shares[n], surface.walls.mesh), progress.simplify, coarse);
     if (!is_plain(parameters)) kept.clear();
-    CoarseWalls& own = kept.emplace_back(coarse);
-    own.level.emplace(level_of({own.walls, own.triangles, surface.labels, surface.extracted}));
-    add_levels(*own.level, shares[n], grid, parameters, progress.encode, parts);
+    const auto& own = is_plain(parameters) ? walls.emplace_back(copy_of(coarse)) : coarse;
+    CoarseLevel& level = kept.emplace_back(own);
+    level.level.emplace(level_of({own, level.triangles, surface.labels, surface.extracted}));
+    add_levels(*level.level, shares[n], grid, parameters, progress.encode, parts);
   }
   write_glb(parts, grid, provenance, writing(context, parameters), sink);
 }
@@ -304,8 +305,8 @@ std::optional<mesh::Topology> encode_surface(const FileContent& content,
   for (std::size_t n = 0; n < shares.size(); ++n) {
     const LevelProgress progress(context, parameters, n + 1);
     coarsen(count_of(shares[n], mesh), progress.simplify, coarse);
-    if (!is_plain(parameters)) kept.clear();
-    part.add_level(level_of(shares[n], kept.emplace_back(copy_of(coarse)), progress.encode));
+    const auto& level = is_plain(parameters) ? kept.emplace_back(copy_of(coarse)) : coarse;
+    part.add_level(level_of(shares[n], level, progress.encode));
   }
   write_glb({&part, 1}, grid, content.provenance, writing(context, parameters), sink);
   if (is_plain(parameters)) return topology;

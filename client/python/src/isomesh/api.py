@@ -512,8 +512,8 @@ class JobOptions(_Parameters, total=False):
         for every reader of glTF, with about ten times as many bytes. meshopt is
         EXT_meshopt_compression and is read faster than draco; khr-meshopt is the same under the
         newer name KHR_meshopt_compression. quantized is KHR_mesh_quantization: rounded numbers
-        that are not compressed. Readers must support the one that is used. The command isomesh
-        has the default none.
+        that are not compressed. Readers must support the one that is used. isomesh mesh asks
+        for none by default.
 
     space
         Directions of x and y in the files: to the patient's left and back, or to the right and
