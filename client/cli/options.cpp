@@ -333,12 +333,19 @@ class Parser {
   }
 
   // A job without a GLB keeps the usual codec, so that it can share its mesh with those of other
-  // clients.
+  // clients. Draco's options, unless they are for a drc file, ask for Draco.
   void choose_glb_codec() {
     const auto formats =
         options_.outputs.empty() ? options_.parameters.formats : formats_of(options_.outputs);
-    const bool has_glb = std::ranges::find(formats, MeshFormat::kGlb) != formats.end();
-    if (has_glb && app_.get_subcommands().front()->get_option("--glb-codec")->count() == 0) {
+    const auto has = [&](MeshFormat format) {
+      return std::ranges::find(formats, format) != formats.end();
+    };
+    const auto is_given = [&](const char* name) {
+      return app_.get_subcommands().front()->get_option(name)->count() > 0;
+    };
+    const bool asks_for_draco =
+        !has(MeshFormat::kDrc) && (is_given("--position-bits") || is_given("--speed"));
+    if (has(MeshFormat::kGlb) && !is_given("--glb-codec") && !asks_for_draco) {
       options_.parameters.glb_codec = kSavedGlbCodec;
     }
   }

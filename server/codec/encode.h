@@ -65,8 +65,8 @@ struct FileContent {
 // Encoders of one format each. They throw Error kCancelled. A surface of labels contains each
 // label's own surface, complete and oriented outward: a wall between two labels occurs once for
 // each. An encoder returns the topology of one surface if it found it on the way; it equals
-// measure_topology's. Positions are converted to the content's space. Except for Draco and GLB
-// with a codec, files are streamed in a few megabytes of memory. The bytes never depend on the
+// measure_topology's. Positions are converted to the content's space. Except for Draco and
+// GLB, files are streamed in a few megabytes of memory. The bytes never depend on the
 // number of threads.
 using Encoder = std::optional<mesh::Topology>(const FileContent& content,
                                               const mesh::Context& context, const Sink& sink);
@@ -120,9 +120,9 @@ Encoder encode_gii;
 // own (KHR_draco_mesh_compression), encoded in parallel. All share one quantisation grid, so
 // vertices on a seam between blocks decode to the same bits, and so do their normals, if requested.
 // parameters.glb_codec has other codecs; array_chunk.h describes their arrays. Without one (kNone),
-// a surface is one primitive with the mesh's own vertices, which is streamed from the mesh; if it
-// is closed, manifold and oriented, EXT_mesh_manifold says so. Then the topology of one surface is
-// always returned.
+// a surface is one primitive with the mesh's own vertices, which is streamed from the mesh; beside
+// it are its normals and distances, one label's surface, and the coarser levels. If it is closed,
+// manifold and oriented, EXT_mesh_manifold says so. The topology of one surface is then returned.
 //
 // Positions are LPS millimetres under a node that transforms them to glTF's metres with Y up. With
 // parameters.lods, coarser levels (MSFT_lod) are nodes like that one outside the scene, each
@@ -137,7 +137,7 @@ Encoder encode_gii;
 // walls are simplified together, so shared walls match there too.
 //
 // Throws Error kTooLarge beyond GLB's 4 GiB and kInternal if Draco fails. kCancelled is checked
-// before each block.
+// before each block, and without a codec for each piece that is written.
 Encoder encode_glb;
 
 // 3MF, a ZIP: "3D Manufacturing Format, Core Specification & Reference Guide", 3MF Consortium, in

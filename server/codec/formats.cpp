@@ -77,6 +77,17 @@ double glb_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
                                          as_double(surface.triangles) * triangle);
 }
 
+// For encoders that hold one label's surface, which can be almost everything, with marks of its
+// vertices. Half of it, because a job by labels counts the memory of encoders twice, for both sides
+// of its walls, and a label's surface has one.
+std::uint64_t label_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
+  constexpr std::uint64_t kMarksPerTriangle = 2;
+  if (!parameters.labels) return 0;
+  return (surface.vertices * sizeof(mesh::Vec3) +
+          surface.triangles * (sizeof(mesh::Triangle) + kMarksPerTriangle)) /
+         2;
+}
+
 std::uint64_t glb_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
   // Measured: its blocks and their bytes.
   constexpr std::uint64_t kPerTriangle = 15;
@@ -86,16 +97,14 @@ std::uint64_t glb_memory(const SurfaceSize& surface, const MeshParameters& param
   constexpr std::uint64_t kMergedPerTriangle = 75;
   // A copy of the surface and its simplification.
   constexpr std::uint64_t kLevelsPerTriangle = 130;
-  // Without a codec: one label's surface, which can be almost everything; the coarser levels.
-  constexpr std::uint64_t kLabelPerTriangle = 40;
+  // The coarser levels that a file without a codec is written from.
   constexpr std::uint64_t kKeptPerTriangle = 30;
   std::uint64_t bytes = parameters.normals ? surface.vertices * sizeof(mesh::Vec3) : 0;
   if (parameters.distances) bytes += surface.vertices * 2 * sizeof(float);
   if (parameters.lods.size() > 1) bytes += surface.triangles * kLevelsPerTriangle;
   if (parameters.glb_codec == GlbCodec::kNone) {
-    if (parameters.labels) bytes += surface.triangles * kLabelPerTriangle;
     const double coarser = levels_of(parameters) - 1;
-    return bytes +
+    return bytes + label_memory(surface, parameters) +
            static_cast<std::uint64_t>(coarser * as_double(surface.triangles)) * kKeptPerTriangle;
   }
   bytes += surface.triangles * kPerTriangle;
@@ -108,17 +117,6 @@ std::uint64_t glb_memory(const SurfaceSize& surface, const MeshParameters& param
 double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
   return 1500 + (parameters.normals ? 65 : 30) * as_double(surface.vertices) +
          24 * as_double(surface.triangles);
-}
-
-// For encoders that hold one label's surface, which can be almost everything, with marks of its
-// vertices. Half of it, because a job by labels counts the memory of encoders twice, for both sides
-// of its walls, and a label's surface has one.
-std::uint64_t label_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
-  constexpr std::uint64_t kMarksPerTriangle = 2;
-  if (!parameters.labels) return 0;
-  return (surface.vertices * sizeof(mesh::Vec3) +
-          surface.triangles * (sizeof(mesh::Triangle) + kMarksPerTriangle)) /
-         2;
 }
 
 std::uint64_t usd_memory(const SurfaceSize& surface, const MeshParameters& parameters) {

@@ -87,13 +87,29 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
 
 bool is_plain(const MeshParameters& parameters) { return parameters.glb_codec == GlbCodec::kNone; }
 
+constexpr std::size_t kHeaderBytes = 12;
+constexpr std::size_t kChunkHeaderBytes = 8;
+
+// Throws Error kTooLarge if a file of so many bytes cannot be.
+void check_size(std::size_t bytes, const MeshParameters& parameters) {
+  if (bytes <= std::numeric_limits<std::uint32_t>::max()) return;
+  throw Error(ErrorCode::kTooLarge,
+              "The encoded surface exceeds the 4 GiB that a GLB file can hold. Set \"triangles\" "
+              "to simplify it" +
+                  std::string(parameters.glb_codec == GlbCodec::kDraco
+                                  ? "."
+                                  : ", or \"glb_codec\" to \"draco\" to compress it."));
+}
+
+bool is_solid(const mesh::Topology& topology) {
+  return topology.boundary_edges == 0 && topology.manifold && topology.oriented;
+}
+
 // A level that will be written from the mesh itself.
-GlbLevel plain_level(double share, const mesh::Mesh& mesh, const MeshParameters& parameters,
-                     const mesh::Topology& topology) {
+GlbLevel plain_level(double share, const mesh::Mesh& mesh, const MeshParameters& parameters) {
   GlbLevel level = {.share = share};
-  if (mesh.triangles.size() == 0) return level;
-  level.arrays.push_back(describe_plain(mesh, parameters));
-  level.is_solid = topology.boundary_edges == 0 && topology.manifold && topology.oriented;
+  if (mesh.triangles.size() > 0) level.arrays.push_back(describe_plain(mesh, parameters));
+  check_size(level.bytes(), parameters);
   return level;
 }
 
@@ -108,18 +124,9 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
   std::string json = glb_document(parts, layout, grid, provenance);
   json.resize(glb_padded(json.size()), ' ');
 
-  constexpr std::size_t kHeaderBytes = 12;
-  constexpr std::size_t kChunkHeaderBytes = 8;
   const std::size_t total = kHeaderBytes + kChunkHeaderBytes + json.size() +
                             (binary_bytes == 0 ? 0 : kChunkHeaderBytes + binary_bytes);
-  if (total > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::kTooLarge,
-                "The encoded surface exceeds the 4 GiB that a GLB file can hold. Set \"triangles\" "
-                "to simplify it" +
-                    std::string(provenance.parameters.glb_codec == GlbCodec::kDraco
-                                    ? "."
-                                    : ", or \"glb_codec\" to \"draco\" to compress it."));
-  }
+  check_size(total, provenance.parameters);
   write_words(sink, {kMagic, kVersion, static_cast<std::uint32_t>(total)});
   write_words(sink, {static_cast<std::uint32_t>(json.size()), kJsonChunk});
   sink(std::as_bytes(std::span(json)));
@@ -134,6 +141,9 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
     }
   };
   for (const GlbLevel* level : layout.order()) level->put(counted);
+  if (written != binary_bytes) {
+    throw Error(ErrorCode::kInternal, "the arrays of a GLB file have other sizes than it tells");
+  }
 }
 
 GlbPart part_of(const LabelSummary& label) {
@@ -213,7 +223,11 @@ GlbLevel plain_label(const WallLevel& walls, std::size_t number, double share,
   const mesh::OneThread alone;
   mesh::Mesh mesh;
   extract_label(walls.surface.walls, walls.surface.triangles, number, mesh);
-  GlbLevel level = plain_level(share, mesh, parameters, measure_topology(mesh, context));
+  GlbLevel level = plain_level(share, mesh, parameters);
+  const LabelSummary& label = walls.surface.labels[number - 1];
+  // The job has measured the labels of the finest level.
+  level.is_solid = share == 1 ? label.closed && label.manifold && label.oriented
+                              : is_solid(measure_topology(mesh, context));
   level.put_arrays = [&walls, number, &parameters, context](const Sink& sink) {
     const OwnSurface own(walls.surface, number, walls.distances, parameters, context);
     put_plain(own.mesh, parameters, own.distances.values.span(), context, sink);
@@ -254,8 +268,9 @@ void encode_labels(const LabelledSurface& surface, const Provenance& provenance,
   const auto level_of = [&](const LabelledSurface& walls) {
     return WallLevel{walls, {walls.walls.mesh, parameters, surface.extracted, quiet}};
   };
-  const WallLevel finest = level_of(surface);
-  add_levels(finest, 1, grid, parameters, LevelProgress(context, parameters, 0).encode, parts);
+  std::optional<WallLevel> finest(level_of(surface));
+  add_levels(*finest, 1, grid, parameters, LevelProgress(context, parameters, 0).encode, parts);
+  if (!is_plain(parameters)) finest.reset();
   mesh::SeparatingSurface coarse;
   if (!shares.empty()) coarse = copy_of(surface.walls);
   // Plain files are written from the walls of all levels.
@@ -264,11 +279,11 @@ void encode_labels(const LabelledSurface& surface, const Provenance& provenance,
   for (std::size_t n = 0; n < shares.size(); ++n) {
     const LevelProgress progress(context, parameters, n + 1);
     coarsen(count_of(shares[n], surface.walls.mesh), progress.simplify, coarse);
-    if (!is_plain(parameters)) kept.clear();
     const auto& own = is_plain(parameters) ? walls.emplace_back(copy_of(coarse)) : coarse;
     CoarseLevel& level = kept.emplace_back(own);
     level.level.emplace(level_of({own, level.triangles, surface.labels, surface.extracted}));
     add_levels(*level.level, shares[n], grid, parameters, progress.encode, parts);
+    if (!is_plain(parameters)) kept.clear();
   }
   write_glb(parts, grid, provenance, writing(context, parameters), sink);
 }
@@ -289,10 +304,11 @@ std::optional<mesh::Topology> encode_surface(const FileContent& content,
     if (!is_plain(parameters)) {
       return encode_level(share, level, distances_of(level), grid, parameters, progress);
     }
+    GlbLevel plain = plain_level(share, level, parameters);
     const mesh::Topology found = measure_topology(level, quiet);
-    if (progress.progress) progress.progress(1);
+    plain.is_solid = is_solid(found);
     if (!topology) topology = found;
-    GlbLevel plain = plain_level(share, level, parameters, found);
+    if (progress.progress) progress.progress(1);
     plain.put_arrays = [&parameters, &level, distances_of, quiet](const Sink& to) {
       put_plain(level, parameters, distances_of(level).values.span(), quiet, to);
     };

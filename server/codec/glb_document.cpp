@@ -32,20 +32,20 @@ const char* meshopt_extension(GlbCodec codec) {
   return codec == GlbCodec::kKhrMeshopt ? "KHR_meshopt_compression" : nullptr;
 }
 
+bool has_steps(const Grid& grid, GlbCodec codec) {
+  return codec != GlbCodec::kDraco && codec != GlbCodec::kNone && is_on_steps(grid);
+}
+
 // The extensions that readers must support.
-std::vector<const char*> required_extensions(GlbCodec codec) {
-  switch (codec) {
-    case GlbCodec::kDraco:
-      return {kDracoExtension};
-    case GlbCodec::kMeshopt:
-    case GlbCodec::kKhrMeshopt:
-      return {meshopt_extension(codec), kQuantizationExtension};
-    case GlbCodec::kQuantized:
-      return {kQuantizationExtension};
-    case GlbCodec::kNone:
-      break;
-  }
-  return {};
+std::vector<const char*> required_extensions(const Grid& grid, const MeshParameters& parameters) {
+  const GlbCodec codec = parameters.glb_codec;
+  if (codec == GlbCodec::kNone) return {};
+  if (codec == GlbCodec::kDraco) return {kDracoExtension};
+  std::vector<const char*> required;
+  if (const char* const extension = meshopt_extension(codec)) required.push_back(extension);
+  const bool is_quantized = has_steps(grid, codec) || parameters.normals;
+  if (is_quantized) required.push_back(kQuantizationExtension);
+  return required;
 }
 
 // Adds a primitive to the last mesh, with its accessors and its buffer view.
@@ -176,8 +176,7 @@ Json turned_node(const std::string& name) {
 class Steps {
  public:
   Steps(const Grid& grid, const MeshParameters& parameters)
-      : are_used_(parameters.glb_codec != GlbCodec::kDraco &&
-                  parameters.glb_codec != GlbCodec::kNone && is_on_steps(grid)),
+      : are_used_(has_steps(grid, parameters.glb_codec)),
         low_{grid.low[0], grid.low[1], grid.low[2]},
         step_(double{grid.side} / (std::exp2(grid.bits) - 1)) {}
 
@@ -291,8 +290,9 @@ class Nodes {
 };
 
 // Lists the extensions of the file, and adds the buffer that compressed arrays are unpacked to.
-void add_extensions(Json& gltf, const GlbLayout& layout, GlbCodec codec) {
-  const std::vector<const char*> required = required_extensions(codec);
+void add_extensions(Json& gltf, const GlbLayout& layout, const Grid& grid,
+                    const MeshParameters& parameters) {
+  const std::vector<const char*> required = required_extensions(grid, parameters);
   if (!required.empty()) {
     gltf["extensionsUsed"] = required;
     gltf["extensionsRequired"] = required;
@@ -300,7 +300,7 @@ void add_extensions(Json& gltf, const GlbLayout& layout, GlbCodec codec) {
   if (std::ranges::any_of(layout.order(), &GlbLevel::is_solid)) {
     gltf["extensionsUsed"].push_back(kManifoldExtension);
   }
-  if (const char* const extension = meshopt_extension(codec)) {
+  if (const char* const extension = meshopt_extension(parameters.glb_codec)) {
     gltf["buffers"].push_back(
         {{"byteLength", 0}, {"extensions", {{extension, {{"fallback", true}}}}}});
   }
@@ -349,7 +349,7 @@ std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout
       gltf[list] = Json::array();
     }
     gltf["buffers"] = Json::array({{{"byteLength", layout.bytes()}}});
-    add_extensions(gltf, layout, provenance.parameters.glb_codec);
+    add_extensions(gltf, layout, grid, provenance.parameters);
   }
   Nodes nodes(gltf, layout, provenance.parameters);
   Json all = Json::array();

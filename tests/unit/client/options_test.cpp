@@ -334,6 +334,19 @@ TEST_F(OptionsTest, AGlbThatIsSavedHasNoCodecUnlessOneIsNamed) {
   }
 }
 
+TEST_F(OptionsTest, DracosOptionsAskForDracoUnlessADrcFileTakesThem) {
+  const std::string drc = folder_ / "head.drc";
+  for (const Words& words : {Words{"--position-bits", "16"}, Words{"--speed", "2"}}) {
+    EXPECT_EQ(options_from(mesh(words)).parameters.glb_codec, GlbCodec::kDraco);
+    Words both = words;
+    both.insert(both.end(), {"-o", drc});
+    EXPECT_EQ(options_from(mesh(both)).parameters.glb_codec, GlbCodec::kNone);
+    Words named = words;
+    named.insert(named.end(), {"--glb-codec", "quantized"});
+    EXPECT_EQ(options_from(mesh(named)).parameters.glb_codec, GlbCodec::kQuantized);
+  }
+}
+
 // Jobs without a GLB can share their meshes with those of other clients; those of `submit` are for
 // any of them.
 TEST_F(OptionsTest, OtherJobsHaveTheCodecOfTheApi) {

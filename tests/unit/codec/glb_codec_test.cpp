@@ -92,6 +92,18 @@ TEST_P(ArrayGlb, KeepsCoordinatesOfMoreThan16BitsAsTheyAre) {
   EXPECT_EQ(whole(test::read_with_node(glb)).triangles.size(), mesh.triangles.size());
 }
 
+TEST_P(ArrayGlb, RequiresQuantizationOnlyIfNumbersAreRounded) {
+  Provenance provenance = with_codec(GetParam(), 17);
+  const auto is_required = [&] {
+    const std::string glb = encoded(test::large_mesh(), MeshFormat::kGlb, provenance);
+    const std::string text = test::open_container(glb).document.dump();
+    return text.find("KHR_mesh_quantization") != std::string::npos;
+  };
+  EXPECT_TRUE(is_required());
+  provenance.parameters.normals = false;
+  EXPECT_FALSE(is_required());
+}
+
 TEST_P(ArrayGlb, IsTheSameOnAnyNumberOfThreads) {
   test::expect_same_on_any_threads([] { return glb_of(test::large_mesh()); });
 }

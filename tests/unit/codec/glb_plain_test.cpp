@@ -1,5 +1,7 @@
 // GLB without a codec: the mesh as it is, for readers that decode nothing.
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <set>
 #include <span>
@@ -8,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -152,6 +155,17 @@ TEST(PlainGlb, SaysThatASurfaceIsSolidOnlyIfItIs) {
   std::swap(turned.triangles[0][0], turned.triangles[0][1]);
   EXPECT_EQ(solid_meshes(test::open_container(plain_glb(turned)).document),
             std::vector<bool>{false});
+}
+
+TEST(PlainGlb, OfMoreThan4GiBIsRefusedBeforeItsTrianglesAreRead) {
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+  mesh::Mesh mesh;
+  mesh.positions.resize_for_overwrite(1);
+  mesh.positions[0] = {};
+  mesh.triangles.resize_for_overwrite(kMost / sizeof(mesh::Triangle) + 1);  // takes no memory
+  const Error error = test::error_of([&] { plain_glb(mesh); });
+  EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
+  EXPECT_THAT(error.what(), testing::HasSubstr("\"glb_codec\" to \"draco\""));
 }
 
 TEST(PlainGlb, OfNothingIsAFileWithoutAMesh) {

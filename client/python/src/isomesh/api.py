@@ -290,7 +290,7 @@ FillCavities = bool
 Crop = Union['Optional[Sequence[Sequence[float]]]']
 MaxError = Union['Optional[float]']
 Triangles = Union['Optional[int]']
-#: Number of bits that Draco keeps per coordinate. The grid spans the mesh's longest side.
+#: Bits per coordinate in drc, and in glb with a codec. The grid spans the mesh's longest side.
 PositionBits = int
 #: Draco's encoding speed; low values make smaller files and take longer. 0 to 4 use valence
 #: coding by libdraco: the smallest files, slow. 5 to 9 are all the same: isomesh's own
