@@ -176,6 +176,7 @@ std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
                                              const LabelTriangles& triangles, std::size_t number) {
   std::vector<std::uint32_t> vertices;
   const VertexChoice choice(surface.mesh.triangles.span(), triangles.of(number));
+  vertices.reserve(choice.count());
   choice.visit([&](std::uint64_t v) { vertices.push_back(static_cast<std::uint32_t>(v)); });
   return vertices;
 }

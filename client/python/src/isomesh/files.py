@@ -61,10 +61,10 @@ def _mode_of(target: Path) -> int:
 
 @contextlib.contextmanager
 def written(target: Path) -> Iterator[IO[bytes]]:
-    """A file to write to and read from, which takes the place of `target` at the end, and is removed on errors."""
+    """A file to write to, which takes the place of `target` at the end, and is removed on errors."""
     number, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
-        with os.fdopen(number, "w+b") as file:
+        with os.fdopen(number, "wb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
