@@ -1,9 +1,9 @@
-"""What arrived of a file, in a few words."""
+"""Says in a few words how much of a file arrived."""
 import itertools
 import re
 
 UNITS = {1: 'mm', 0.001: 'm', 0.1: 'cm'}
-# Where the file's own specification, or our own words in it, puts the object; and what else is right because a program turns it.
+# The unit and axes that the file's specification, or its own text, gives the object.
 EXPECTED = {'glb': ('m', 'Y up'), 'usda': ('mm', 'Y up'), 'usdz': ('mm', 'Y up'), 'gii': ('mm', 'RAS')}
 # Axes: which of x, y, z of LPS, and with which sign.
 AXES = {

@@ -34,6 +34,7 @@ READERS = [
     *row('babylon', 'Babylon.js', [NPM], 'glb stl obj'),
     *row('gltf_transform', 'glTF Transform', [NPM], 'glb'),
     *row('loaders_gl', 'loaders.gl', [NPM], 'glb drc obj'),
+    *row('manifold', 'Manifold', [NPM], 'glb'),
     *row('draco3d', 'draco3d', [NPM], 'drc'),
     *row('vtkjs', 'vtk.js', [NPM], 'glb drc stl ply obj vtk vtp'),
     *row('itk_wasm', 'ITK-Wasm mesh-io', [NPM], 'stl obj off vtk'),
@@ -81,7 +82,7 @@ def command_of(reader, folder, path):
 
 
 def read(reader, folder, path):
-    """What the reader prints, or {'ends': ..} or {'error': ..}."""
+    """Runs the reader. Returns the JSON that it prints, or {'ends': ..} or {'error': ..}."""
     try:
         done = subprocess.run(
             ['nice', *command_of(reader, folder, path)],
