@@ -1,4 +1,4 @@
-// What all readers in JavaScript share: `main` reads the file that the command line names and prints one line of JSON:
+// All readers in JavaScript share this. `main` reads the file that the command line names and prints one line of JSON:
 // {version, surfaces: [{name, colour, triangles, vertices, bounds, normals, labels, values}]} or {version, error}.
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
@@ -47,6 +47,12 @@ export function hexOfLinear(values) {
 
 export function hex(values) {
   return `#${values.map((v) => Math.round(255 * v).toString(16).padStart(2, '0')).join('')}`;
+}
+
+// The colours of pixels of so many bytes, once each.
+export function hexesOfBytes(bytes, stride) {
+  const all = Array.from({ length: bytes.length / stride }, (_, at) => hex([...bytes.slice(stride * at, stride * at + 3)].map((v) => v / 255)));
+  return [...new Set(all)];
 }
 
 // `read` takes the path and its suffix, and returns surfaces.

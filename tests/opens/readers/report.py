@@ -1,8 +1,9 @@
-"""What all readers in Python share. `main(version, read)` reads the file that the command line names and prints one line of JSON:
+"""All readers in Python share this. `main(version, read)` reads the file that the command line names and prints one line of JSON:
 {version, surfaces: [{name, colour, triangles, vertices, bounds, normals, labels, values}]} or {version, error}.
 """
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -25,7 +26,7 @@ def hex_of_linear(values):
 
 
 def said(*command, **options):
-    """What a program prints; raises if it is ended by a signal."""
+    """The output of a program; raises if it is ended by a signal."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors='replace', **options)
     if done.returncode < 0 or 128 < done.returncode < 160:
         raise RuntimeError(f'ends with signal {done.returncode % 128}')
@@ -47,10 +48,23 @@ def surface_of_stl(path):
 
 
 def surface_of_obj(path):
-    """An OBJ that a program wrote."""
+    """An OBJ that a program wrote, with the colours that some programs put behind the coordinates."""
     with open(path, encoding='utf-8', errors='replace') as file:
         lines = [line.split() for line in file]
-    return surface([line[1:4] for line in lines if line[:1] == ['v']], sum(line[:1] == ['f'] for line in lines))
+    rows = [line[1:] for line in lines if line[:1] == ['v']]
+    return surface([row[:3] for row in rows], sum(line[:1] == ['f'] for line in lines), colours=sorted({hex_of(row[3:6]) for row in rows if len(row) > 5}))
+
+
+def surface_of_ply(path):
+    """A PLY that a program wrote as text, with triangles only."""
+    with open(path, encoding='utf-8', errors='replace') as file:
+        text = file.read()
+    head, body = text.split('end_header\n')
+    counts = dict(re.findall(r'element (\w+) (\d+)', head))
+    names = re.findall(r'property (?!list)\w+ (\w+)', head.split('element face')[0])
+    rows = [dict(zip(names, line.split())) for line in body.splitlines()[: int(counts['vertex'])]]
+    colours = {hex_of([int(row[name]) / 255 for name in ('red', 'green', 'blue')]) for row in rows if 'red' in row}
+    return surface([[row[axis] for axis in 'xyz'] for row in rows], counts['face'], colours=sorted(colours))
 
 
 def main(version, read, path=None):
