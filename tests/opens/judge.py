@@ -1,12 +1,13 @@
-"""Tells in a few words how a file arrived in a program, and whether that is right."""
+"""Says in a few words how much of a file arrived."""
 import itertools
 import re
 
 UNITS = {1: 'mm', 0.001: 'm', 0.1: 'cm'}
 # The unit and the axes that the file's own specification, or our own words in it, gives the object; others are in LPS millimetres.
 EXPECTED = {'glb': ('m', 'Y up'), 'usda': ('mm', 'Y up'), 'usdz': ('mm', 'Y up'), 'gii': ('mm', 'RAS')}
-# Blender turns glTF to its own axes, with Z up. three scales USD to its own unit, the metre.
-OWN = {('blender', 'glb'): ('m', 'LPS'), ('three', 'usda'): ('m', 'Y up'), ('three', 'usdz'): ('m', 'Y up')}
+# Blender turns glTF to its own axes, with Z up, and Manifold also to millimetres. three scales USD to its own unit, the metre.
+OWN = {('blender', 'glb'): ('m', 'LPS'), ('manifold', 'glb'): ('mm', 'LPS')}
+OWN |= {('three', 'usda'): ('m', 'Y up'), ('three', 'usdz'): ('m', 'Y up')}
 # Axes: which of x, y, z of LPS, and with which sign.
 AXES = {
     ((0, 1), (1, 1), (2, 1)): 'LPS',

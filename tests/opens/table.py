@@ -59,11 +59,11 @@ def overview(readers, judged):
 
 
 def details(readers, judged, file):
-    """Programs that get the same share a row. Those that open nothing are in the large table."""
+    """Programs that get the same share a row. Those that open nothing of a kind are in the large table."""
     programs = {}
     for reader, program in readers:
         cells = judged.get((reader.key, file))
-        if cells and len(cells) > 1:
+        if cells and (len(cells) > 1 or file != main_of(file.split('-', 1)[1])):
             programs.setdefault(tuple(cells.get(column, ('–', True)) for column in COLUMNS), []).append(program)
     columns = [column for at, column in enumerate(COLUMNS) if any(cells[at][0] != '–' for cells in programs)]
     rows = []

@@ -2,8 +2,12 @@
 import struct
 import zipfile
 
-import Savitar
 from report import main, package_version, surface
+
+try:
+    import Savitar
+except ModuleNotFoundError:
+    import pySavitar as Savitar  # its name since Cura 5
 
 
 def surfaces_of(node):

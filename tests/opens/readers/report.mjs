@@ -1,4 +1,4 @@
-// All readers in JavaScript share this. `main` reads the file that the command line names and prints one line of JSON:
+// Shared by all readers in JavaScript: `main` reads the file that the command line names and prints one line of JSON:
 // {version, surfaces: [{name, colour, triangles, vertices, bounds, normals, labels, values}]} or {version, error}.
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';

@@ -1,4 +1,4 @@
-"""All readers in Python share this. `main(version, read)` reads the file that the command line names and prints one line of JSON:
+"""Shared by all readers in Python. `main(version, read)` reads the file that the command line names and prints one line of JSON:
 {version, surfaces: [{name, colour, triangles, vertices, bounds, normals, labels, values}]} or {version, error}.
 """
 import json
@@ -26,7 +26,7 @@ def hex_of_linear(values):
 
 
 def said(*command, **options):
-    """The output of a program; raises if it is ended by a signal."""
+    """Returns the text that a program prints; raises if it is ended by a signal."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors='replace', **options)
     if done.returncode < 0 or 128 < done.returncode < 160:
         raise RuntimeError(f'ends with signal {done.returncode % 128}')

@@ -149,7 +149,42 @@ TEST(QuantizedGlb, HasIndicesOf16BitsWhereTheySuffice) {
   }
 }
 
-// At each place the normal that was found there.
+// Triangles that share no vertex, except for the last of them.
+mesh::Mesh triangles_of(std::uint32_t vertices) {
+  mesh::Mesh mesh;
+  mesh.positions.resize_for_overwrite(vertices);
+  mesh.triangles.resize_for_overwrite((vertices + 2) / 3);
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    const std::uint32_t triangle = v / 3;
+    const std::uint32_t corner = v % 3;
+    mesh.positions[v] = {static_cast<float>(2 * (triangle % 256) + (corner == 1 ? 1 : 0)),
+                         static_cast<float>(2 * (triangle / 256) + (corner == 2 ? 1 : 0)), 0};
+    if (corner == 2 || v + 1 == vertices) mesh.triangles[triangle] = {v - 2, v - 1, v};
+  }
+  mesh.layer_vertices = {0, mesh.positions.size()};
+  mesh.layer_triangles = {0, mesh.triangles.size()};
+  return mesh;
+}
+
+TEST(QuantizedGlb, HasIndicesOf16BitsUpTo65535Vertices) {
+  for (const std::uint32_t vertices : {65535U, 65536U}) {
+    const mesh::Mesh mesh = triangles_of(vertices);
+    Provenance provenance = with_codec(GlbCodec::kQuantized, 16);
+    provenance.parameters.merge = true;
+    const std::string glb = encoded(mesh, MeshFormat::kGlb, provenance);
+    const nlohmann::json document = test::open_container(glb).document;
+    const auto& primitive = document["meshes"][0]["primitives"][0];
+    const auto& indices = document["accessors"][primitive["indices"].get<std::size_t>()];
+    EXPECT_EQ(indices["componentType"], vertices == 65535 ? 5123 : 5125);
+    const auto primitives = test::read_with_node(glb);
+    ASSERT_EQ(primitives.size(), 1U);
+    EXPECT_EQ(primitives[0].mesh.points.size(), vertices);
+    test::expect_same_mesh(primitives[0].mesh, mesh, 16);
+    test::expect_same_mesh(read_back(glb), mesh, 16);
+  }
+}
+
+// The normals by the places of their vertices.
 std::map<Vec3, Vec3> normals_in(const std::vector<test::GlbPrimitive>& primitives) {
   std::map<Vec3, Vec3> found;
   for (const auto& primitive : primitives) {

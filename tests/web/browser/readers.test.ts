@@ -1,4 +1,4 @@
-// What the loaders of three.js make of the files, in the browser that their users have.
+// The loaders of three.js read the files in a browser, as their users do.
 import { fileURLToPath } from 'node:url';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';

@@ -1,4 +1,4 @@
-// What three.js makes of a file, for readers.test.ts, in Chromium.
+// Reads a file with three.js in Chromium, for readers.test.ts.
 import { Box3, Color, Group, Mesh } from 'three';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { ThreeMFLoader } from 'three/addons/loaders/3MFLoader.js';

@@ -42,7 +42,7 @@ function glb(streams: number[][], change: (gltf: Record<string, unknown>) => voi
 
 // A GLB of two vertices and one triangle as they are: positions, normals, distances and indices.
 function plainGlb(attributes: Record<string, number>, positions: object = {}): Uint8Array {
-  const arrays = [24, 24, 8, 12].map((bytes) => new Array<number>(bytes).fill(1));
+  const arrays = [24, 24, 8, 12].map((bytes, at) => new Array<number>(bytes).fill(at + 1));
   return glb(arrays, (gltf) => {
     gltf.accessors = [
       { bufferView: 0, componentType: 5126, count: 2, type: 'VEC3', min: [0, 0, 0], max: [1, 2, 3], ...positions },
@@ -159,11 +159,20 @@ describe('GlbReader', () => {
   });
 
   it('finds the arrays of a surface that is not compressed, which come together', () => {
-    const { found, order, complete } = taken(plainGlb({ POSITION: 0, NORMAL: 1, _DISTANCE_MM: 2 }));
+    const file = plainGlb({ POSITION: 0, NORMAL: 1, _DISTANCE_MM: 2 });
+    const { found, order, complete } = taken(file);
     expect(found).toMatchObject([{ offset: 0, length: 12 * 2 + 12 * 2 + 4 * 2 + 4 * 3, triangles: 1, vertices: 2, distanceId: null }]);
-    expect(found[0]?.arrays).toEqual({ positions: 0, distances: 48, index: 56, vertices: 2, corners: 3 });
+    const ranges = [[0, 24], [56, 68], [48, 56]];
+    expect(found[0]?.arrays).toEqual({ ranges, vertices: 2, corners: 3, hasDistances: true });
     expect([order, complete]).toEqual([[0], true]);
-    expect(taken(plainGlb({ POSITION: 0 })).found[0]?.arrays?.distances).toBeNull();
+    const without = taken(plainGlb({ POSITION: 0 })).found[0]?.arrays;
+    expect(without).toEqual({ ranges: ranges.slice(0, 2), vertices: 2, corners: 3, hasDistances: false });
+  });
+
+  it('hands over arrays one behind the other, without the normals', () => {
+    const file = plainGlb({ POSITION: 0, NORMAL: 1, _DISTANCE_MM: 2 });
+    const values = (count: number, value: number): number[] => new Array<number>(count).fill(value);
+    expect(read(file, 7).streams).toEqual([[...values(24, 1), ...values(12, 4), ...values(8, 3)]]);
   });
 
   it('refuses arrays of other numbers than floats and 32-bit indices', () => {

@@ -54,6 +54,18 @@ export function withGlb(formats: readonly MeshFormat[]): JobParameters['formats'
   return ['glb', ...meshFormats.filter((format) => format !== 'glb' && formats.includes(format))];
 }
 
+export function isShownCodec(codec: unknown): boolean {
+  return codec === 'draco' || codec === 'none';
+}
+
+// The files that the page can show.
+export const shownFiles = 'GLB with the codec draco or none, and Draco in LPS';
+
+// Changes that give the job a GLB file that the page can show.
+export function withShownGlb({ formats, glb_codec: codec = 'draco' }: JobParameters): Partial<JobParameters> {
+  return { formats: withGlb(formats), glb_codec: isShownCodec(codec) ? codec : 'draco' };
+}
+
 // The last part of its name, which no other parameter has.
 function addressName({ name }: Parameter): string {
   return name.split('.').at(-1) ?? name;

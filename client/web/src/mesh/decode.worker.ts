@@ -8,7 +8,7 @@ import { buffersIn, type WorkerScope } from './transfer';
 export interface DecodeRequest {
   id: number;
   bytes: Uint8Array<ArrayBuffer>;
-  // Of bytes that are not compressed; the two numbers below are those of a Draco stream.
+  // Undefined if the bytes are a Draco stream. The two numbers below are for such a stream only.
   arrays: PlainArrays | undefined;
   // The position attribute's number in the stream; null: the stream's only one.
   positionId: number | null;
@@ -79,13 +79,22 @@ function decode(draco: DracoModule, { bytes, positionId, distanceId }: DecodeReq
   }
 }
 
-function plain(bytes: Uint8Array<ArrayBuffer>, arrays: PlainArrays): Triangles {
-  const floatsAt = (begin: number, count: number): Float32Array<ArrayBuffer> => new Float32Array(bytes.slice(begin, begin + 4 * count).buffer);
-  const triangles = {
-    positions: floatsAt(arrays.positions, 3 * arrays.vertices),
-    index: new Uint32Array(bytes.slice(arrays.index, arrays.index + 4 * arrays.corners).buffer),
-  };
-  return arrays.distances === null ? triangles : { ...triangles, distances: floatsAt(arrays.distances, arrays.vertices) };
+// Views of the bytes, which begin their buffer, so that all arrays are aligned.
+function plain({ buffer }: Uint8Array<ArrayBuffer>, { vertices, corners, hasDistances }: PlainArrays): Triangles {
+  const positions = new Float32Array(buffer, 0, 3 * vertices);
+  const index = new Uint32Array(buffer, positions.byteLength, corners);
+  if (!hasDistances) return { positions, index };
+  return { positions, index, distances: new Float32Array(buffer, positions.byteLength + index.byteLength, vertices) };
+}
+
+// Copies a view of a larger buffer: a block must not keep the indices of its file in memory.
+function owned(array: Float32Array<ArrayBuffer>): Float32Array<ArrayBuffer> {
+  return array.byteLength < array.buffer.byteLength ? array.slice() : array;
+}
+
+function blockOf(triangles: Triangles, { cell, hasCreases }: DecodeRequest): Block {
+  const block = prepare(triangles, cell, hasCreases);
+  return { ...block, positions: owned(block.positions), ...(block.distances && { distances: owned(block.distances) }) };
 }
 
 async function trianglesOf(request: DecodeRequest): Promise<Triangles> {
@@ -96,7 +105,7 @@ scope.onmessage = (event) => {
   const request = event.data;
   trianglesOf(request)
     .then((triangles) => {
-      const blocks = split(triangles).map((part) => prepare(part, request.cell, request.hasCreases));
+      const blocks = split(triangles).map((part) => blockOf(part, request));
       scope.postMessage({ id: request.id, blocks, error: '' }, buffersIn(blocks));
     })
     .catch((error: unknown) => {

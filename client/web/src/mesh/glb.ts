@@ -12,21 +12,22 @@ const largestJson = 256 * 1024 * 1024;
 const floatType = 5126;
 const unsignedIntType = 5125;
 
-// Where floats and 32-bit indices begin in the bytes of a primitive that is not compressed.
+type Range = readonly [begin: number, end: number];
+
+// The arrays of a primitive that is not compressed. They are handed over one behind the other.
 export interface PlainArrays {
-  positions: number;
-  index: number;
-  // Of the distances to the surface as it was extracted; null where the file has none.
-  distances: number | null;
+  // In the binary chunk: positions as floats, 32-bit indices, and distances as floats if the file has them.
+  ranges: readonly Range[];
   vertices: number;
   corners: number;
+  hasDistances: boolean;
 }
 
 export interface Primitive {
   // Place in the binary chunk.
   offset: number;
   length: number;
-  // Of a primitive that is not compressed.
+  // Missing if the primitive is a Draco stream.
   arrays?: PlainArrays;
   // The numbers of the attributes in a Draco stream; null where there are none.
   positionId: number | null;
@@ -137,18 +138,12 @@ function plainPlaceOf(
   const index = arrayOf(indices, unsignedIntType, 1);
   if (!positions || !index) return null;
   const distances = arrayOf(attributes._DISTANCE_MM, floatType, 1);
-  const all = [positions, index, ...(distances ? [distances] : [])];
-  const offset = Math.min(...all.map(({ begin }) => begin));
+  const ranges = [positions, index, ...(distances ? [distances] : [])].map(({ begin, end }) => [begin, end] as const);
+  const offset = Math.min(...ranges.map(([begin]) => begin));
   return {
     offset,
-    length: Math.max(...all.map(({ end }) => end)) - offset,
-    arrays: {
-      positions: positions.begin - offset,
-      index: index.begin - offset,
-      distances: distances && distances.begin - offset,
-      vertices: positions.count,
-      corners: index.count,
-    },
+    length: Math.max(...ranges.map(([, end]) => end)) - offset,
+    arrays: { ranges, vertices: positions.count, corners: index.count, hasDistances: distances !== null },
   };
 }
 
@@ -169,7 +164,7 @@ export function primitivesOf(gltf: Gltf): Primitive[] {
     const positionId = draco?.attributes.POSITION;
     const place = view ? { offset: view.byteOffset ?? 0, length: view.byteLength } : plainPlaceOf(gltf, primitive);
     if (!place || !position || !indices || (draco && positionId === undefined)) {
-      throw new Error('The GLB file holds a mesh that is not compressed with Draco, and in another form than plain arrays.');
+      throw new Error('The GLB file holds a mesh that is not compressed with Draco and not stored as plain arrays.');
     }
     return {
       ...place,
@@ -264,10 +259,21 @@ export class GlbReader {
       const index = this.order[this.next] ?? -1;
       const part = this.primitives[index];
       if (!part || part.offset + part.length > this.filled) return;
-      this.listener.onStream(index, binary.slice(part.offset, part.offset + part.length));
+      this.listener.onStream(index, gathered(binary, part.arrays?.ranges ?? [[part.offset, part.offset + part.length]]));
       this.next += 1;
     }
   }
+}
+
+// A copy of these bytes, one range behind the other.
+function gathered(bytes: Uint8Array, ranges: readonly Range[]): Uint8Array<ArrayBuffer> {
+  const copy = new Uint8Array(ranges.reduce((sum, [begin, end]) => sum + end - begin, 0));
+  let filled = 0;
+  for (const [begin, end] of ranges) {
+    copy.set(bytes.subarray(begin, end), filled);
+    filled += end - begin;
+  }
+  return copy;
 }
 
 function joined(a: Uint8Array, b: Uint8Array): Uint8Array {

@@ -6,6 +6,7 @@ import type { Job, MeshFile } from '../api/types';
 import { coarseCell, type Block } from './blocks';
 import { GlbReader, type Part, type Primitive } from './glb';
 import { decoders } from './pool';
+import { viewableFile } from './shown';
 
 export interface LoadProgress {
   bytes: number;
@@ -27,16 +28,6 @@ export interface LoadListener {
 
 const mostResumes = 5;
 const resumeDelay = 1000;
-
-// The file that the page can show; null when the job was asked for neither GLB nor Draco, or in a form
-// that the page does not read: GLB with another codec than Draco's, Draco in another space than the slices'.
-export function viewableFile(job: Job): { file: MeshFile; format: 'glb' | 'drc' } | null {
-  const files = job.mesh?.files;
-  const { glb_codec: codec = 'draco', space = 'lps' } = job.parameters;
-  if (files?.glb && (codec === 'draco' || codec === 'none')) return { file: files.glb, format: 'glb' };
-  if (files?.drc && space === 'lps') return { file: files.drc, format: 'drc' };
-  return null;
-}
 
 // Waits until somebody answers again, however long that takes.
 function reconnected(signal: AbortSignal): Promise<void> {

@@ -1,4 +1,4 @@
-// What stands for a block before the first of them is there.
+// Stands for a block until the first one is there.
 import { BufferAttribute, BufferGeometry } from 'three';
 
 // A geometry without triangles, but with a block's attributes: three.js makes other shaders for a geometry without normals, so

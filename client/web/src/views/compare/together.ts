@@ -4,8 +4,10 @@ import { ApiError } from '../../api/problem';
 import type { Job, Vec3, Label } from '../../api/types';
 import { titlesOf } from '../../job/differences';
 import { labelCount } from '../../job/labels';
+import { shownFiles } from '../../job/parameters';
 import type { Part } from '../../mesh/glb';
-import { loadMesh, viewableFile } from '../../mesh/load';
+import { loadMesh } from '../../mesh/load';
+import { viewableFile } from '../../mesh/shown';
 import { surfaceDrawing } from '../../scene/graphics';
 import type { Surface } from '../../scene/surface';
 import { placeOfText } from '../../scene/views';
@@ -25,7 +27,7 @@ export async function togetherView(scope: Scope, route: Route): Promise<HTMLElem
   const jobs = (await Promise.all(ids.map((id) => client.getJob(id)))).filter((job) => viewableFile(job) !== null);
   if (jobs.length === 0) {
     const link = { href: hashOf(['jobs']), text: 'Go to the list of jobs' };
-    throw new ApiError(-1, 'No surfaces to show', 'Choose jobs that made a GLB or Draco file.', [], {}, link);
+    throw new ApiError(-1, 'No surfaces to show', `The page shows ${shownFiles}.`, [], {}, link);
   }
   const volumes = new KnownVolumes();
   await volumes.find(jobs.map(({ volume }) => volume));

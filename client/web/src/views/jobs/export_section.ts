@@ -1,10 +1,10 @@
 // Exports beside the files of a job: for a 3D printer, for a phone, and the certificate of the measurements.
 import type { Job, Volume } from '../../api/types';
-import { withGlb } from '../../job/parameters';
+import { withShownGlb } from '../../job/parameters';
 import { certificateFile, isForPrinting, printingVariant } from '../../job/printing';
 import { isByLabels } from '../../job/table';
 import { fileNameOf, makeVariant } from '../../job/variants';
-import { viewableFile } from '../../mesh/load';
+import { viewableFile } from '../../mesh/shown';
 import { button, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { saveBlob } from '../../ui/save';
@@ -19,7 +19,7 @@ export function exportActions(job: Job, volume: Volume | null): HTMLElement | nu
   if (!mesh || mesh.empty) return null;
   const usdz = async (): Promise<void> => {
     if (mesh.triangles > triangles) {
-      make({ triangles, formats: withGlb(parameters.formats) });
+      make({ triangles, ...withShownGlb(parameters) });
       return;
     }
     phone.disabled = true;

@@ -2,7 +2,7 @@
 import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { changeOf, type Change } from '../../job/changes';
-import { isSameJob, variantOf, withGlb } from '../../job/parameters';
+import { isSameJob, variantOf, withGlb, withShownGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
@@ -109,9 +109,8 @@ export function quality({ parameters }: Job, mesh: MeshSummary): HTMLElement {
 export function accuracy(job: Job): HTMLElement | null {
   const body = certificateBody(job);
   if (!body) return null;
-  const { distances, formats } = job.parameters;
-  if (!distances) {
-    const colour = (): void => makeVariant(job)({ distances: true, formats: withGlb(formats) });
+  if (!job.parameters.distances) {
+    const colour = (): void => makeVariant(job)({ distances: true, ...withShownGlb(job.parameters) });
     body.append(button('Show the distance as colour', colour, { title: 'Starts a job whose GLB file holds the distances' }));
   }
   return section('Distance from the scan', body);

@@ -1,6 +1,6 @@
 // The parameters of a job beside its iso-value, one control for each row of their table.
 import type { JobParameters, MeshFormat } from '../../api/types';
-import { fromText, withGlb } from '../../job/parameters';
+import { fromText, isShownCodec, shownFiles, withGlb } from '../../job/parameters';
 import {
   applies,
   asText,
@@ -73,6 +73,17 @@ function choiceControl(parameter: Parameter, host: FormHost): Control {
   const set = (text: string): void =>
     host.set(parameter, values.find((known) => String(known) === text) ?? text);
   return { element: segmented(labelOf(parameter), choices, value, set) };
+}
+
+// Says so if the page cannot show the file.
+function codecControl(parameter: Parameter, host: FormHost): Control {
+  const hint = h('p.hint', { role: 'status' });
+  const update = (): void => {
+    const codec = valueIn(host.job(), parameter) ?? 'draco';
+    hint.textContent = isShownCodec(codec) ? '' : `The page cannot show GLB with the codec ${asText(codec)}. It shows ${shownFiles}.`;
+  };
+  update();
+  return { element: h('div', choiceControl(parameter, host).element, hint), update, follows: [parameter.name] };
 }
 
 function switchControl(parameter: Parameter, host: FormHost): Control {
@@ -188,6 +199,7 @@ const controls: Partial<Record<string, (parameter: Parameter, host: FormHost) =>
   max_error_mm: errorControl,
   certify: certifyControl,
   formats: formatsControl,
+  glb_codec: codecControl,
   number: numberControl,
   integer: numberControl,
   switch: switchControl,

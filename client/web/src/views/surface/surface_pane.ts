@@ -1,14 +1,15 @@
 // A surface with its tools: what a job made, loaded part by part.
 import { asApiError } from '../../api/problem';
 import type { Job, MeshSummary, Vec3, Volume } from '../../api/types';
-import { loadMesh, viewableFile, type LoadProgress, type LoadTiming } from '../../mesh/load';
+import { loadMesh, type LoadProgress, type LoadTiming } from '../../mesh/load';
+import { viewableFile, whyNotShown } from '../../mesh/shown';
 import { surfaceDrawing } from '../../scene/graphics';
 import type { Picked } from '../../scene/picked';
 import { defaultStyle, lengthOf, type SurfaceStyle } from '../../scene/style';
 import type { Surface } from '../../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../../scene/views';
 import type { LabelState } from '../../job/labels';
-import { withGlb } from '../../job/parameters';
+import { withShownGlb } from '../../job/parameters';
 import { emptyReason } from '../../job/empty';
 import { changeLink, fileNameOf, makeVariant } from '../../job/variants';
 import { button, h, isTyping } from '../../ui/dom';
@@ -149,7 +150,7 @@ export class SurfacePane {
   // Null, and says why, where there is nothing to be shown.
   private async begin(mesh: MeshSummary): Promise<Surface | null> {
     if (!viewableFile(this.job)) {
-      this.say('This job has no file that the page can show. Start it again with GLB or Draco.');
+      this.say(whyNotShown(this.job), h('a', { href: changeLink(this.job) }, 'Change parameters'));
       return null;
     }
     if (mesh.triangles === 0) {
@@ -325,7 +326,7 @@ export class SurfacePane {
       distance.set(!distance.isOn);
       return;
     }
-    const make = (): void => makeVariant(job)({ distances: true, formats: withGlb(job.parameters.formats) });
+    const make = (): void => makeVariant(job)({ distances: true, ...withShownGlb(job.parameters) });
     tell(h('span', 'The file of this surface holds no distances. ', button('Make one that does', make, { class: 'link' })));
   }
 
