@@ -52,7 +52,8 @@ def surface_of_obj(path):
     with open(path, encoding='utf-8', errors='replace') as file:
         lines = [line.split() for line in file]
     rows = [line[1:] for line in lines if line[:1] == ['v']]
-    return surface([row[:3] for row in rows], sum(line[:1] == ['f'] for line in lines), colours=sorted({hex_of(row[3:6]) for row in rows if len(row) > 5}))
+    colours = {hex_of(row[3:6]) for row in rows if len(row) > 5}
+    return surface([row[:3] for row in rows], sum(line[:1] == ['f'] for line in lines), colours=sorted(colours))
 
 
 def surface_of_ply(path):
