@@ -8,7 +8,7 @@ set -eu
 t=$(mktemp -d)
 trap 'rm -rf "$t"' EXIT
 cd "$t"
-for name in assimp-utils=5.2.5~ds0-1+b1 libassimp5=5.2.5~ds0-1+b1 libminizip1 libdraco7; do
+for name in assimp-utils=5.2.5~ds0-1+b1 libassimp5=5.2.5~ds0-1+b1 libminizip1=1.1-8+deb12u1 libdraco7=1.5.5+dfsg-2; do
   apt-get download "$name" >apt.log 2>&1
 done
 for package in *.deb; do dpkg -x "$package" tree; done

@@ -3,15 +3,19 @@
 #   object with two parts. The standard says that a build item is what is printed, and that components are the parts of an object.
 # Seen: PrusaSlicer makes an object of each component and lowers each to the bed on its own. A cube that begins 10 mm above another one
 #   begins at the same height in the exported STL, without a warning. --no-ensure-on-bed keeps the places. Two build items behave alike.
-# Packages: Debian 12: prusa-slicer 2.5.0+dfsg-4, with the libraries that it needs. Its window asks whether the objects are one with
+# Packages: Debian 12: prusa-slicer 2.5.0+dfsg-4, with the libraries below that read and compute. Its window asks whether the objects are one with
 #   several parts; 2.9.2 of Debian 13 does the same. Date: 2026-11-28.
 set -eu
 t=$(mktemp -d)
 trap 'rm -rf "$t"' EXIT
 cd "$t"
-needed=$(apt-get install --simulate --no-install-recommends prusa-slicer=2.5.0+dfsg-4 | sed -n 's/^Inst \(lib[^ ]*\) .*/\1/p')
-# The libraries' names have no blanks.
-apt-get download prusa-slicer=2.5.0+dfsg-4 $needed >apt.log 2>&1
+pinned='prusa-slicer=2.5.0+dfsg-4 libexpat1=2.5.0-1+deb12u5 libopenvdb10.0=10.0.1-2 libblosc1=1.21.3+ds-1 libtbb12=2021.8.0-2+deb12u1
+  libnlopt0=2.7.1-5 libimath-3-1-29=3.1.6-1 libmpfr6=4.2.0-1 libgmp10=2:6.2.1+dfsg1-1.1'
+for library in log filesystem locale thread regex chrono iostreams; do pinned="$pinned libboost-$library""1.74.0=1.74.0+ds1-21"; done
+# The libraries of its window that this machine lacks, of any version. Their names have no blanks.
+others=$(apt-get install --simulate --no-install-recommends $pinned | sed -n 's/^Inst \(lib[^ ]*\) .*/\1/p')
+for name in $others; do case " $pinned " in *" $name="*) ;; *) pinned="$pinned $name" ;; esac; done
+apt-get download $pinned >apt.log 2>&1
 for package in *.deb; do dpkg -x "$package" tree; done
 machine="$(uname -m)-linux-gnu"
 export LD_LIBRARY_PATH="$t/tree/usr/lib/$machine:$t/tree/lib/$machine"

@@ -10,7 +10,7 @@ t=$(mktemp -d)
 trap 'rm -rf "$t"' EXIT
 cd "$t"
 npm install --prefix "$t" --no-audit --no-fund --ignore-scripts --silent three@0.187.0 >npm.log 2>&1
-# What this machine lacks of VTK and of what it depends on; nothing is installed.
+# The packages of VTK, and those it depends on, that this machine lacks. Nothing is installed.
 apt-get -s --no-install-recommends install python3-vtk9=9.1.0+really9.1.0+dfsg2-5+deb12u1 |
   awk '/^Inst/ { print $2 }' | xargs -r apt-get download >apt.log 2>&1
 for package in *.deb; do [ ! -e "$package" ] || dpkg -x "$package" tree; done

@@ -10,7 +10,7 @@ set -eu
 t=$(mktemp -d)
 trap 'rm -rf "$t"' EXIT
 cd "$t"
-# What this machine lacks of the package and of what it depends on; nothing is installed.
+# The package, and those it depends on, that this machine lacks. Nothing is installed.
 apt-get -s --no-install-recommends install python3-vtk9=9.1.0+really9.1.0+dfsg2-5+deb12u1 |
   awk '/^Inst/ { print $2 }' | xargs -r apt-get download >apt.log 2>&1
 for package in *.deb; do [ ! -e "$package" ] || dpkg -x "$package" tree; done

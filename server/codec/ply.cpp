@@ -102,8 +102,9 @@ void encode_ply_labels(const LabelledSurface& surface, const FileContent& conten
   }
   const std::size_t faces = count_of(faces_of(content));
   const LabelValues values(surface);
+  // meshio reads binary uchar as signed, and uint8, its other name, as it is.
   put_text(sink, ply_header(content, values.comments(), vertices,
-                            "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
+                            "property uint8 red\nproperty uint8 green\nproperty uint8 blue\n" +
                                 values.property(),
                             faces));
   BlockWriter writer(context, sink, vertices + faces);

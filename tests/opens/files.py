@@ -1,6 +1,8 @@
 """The files that the readers get, and what each of them holds."""
 import json
+import re
 import subprocess
+import zipfile
 from dataclasses import dataclass, field
 
 import volumes
@@ -31,7 +33,6 @@ class File:
     kind: str
     path: object
     triangles: int = 0
-    vertices: int = 0
     bounds: list = None
     labels: dict = field(default_factory=dict)  # name: (colour, triangles)
 
@@ -47,7 +48,7 @@ class File:
 # The shapes that are not an atlas or a ball show what is special; the formats are those that can hold it.
 KINDS = {
     'atlas': [*(f'glb-{codec}' for codec in CODECS), 'ply', 'obj', '3mf', 'usda', 'usdz', 'vtk', 'vtp'],
-    'ball': ['drc', 'stl', 'off', 'gii'],
+    'ball': ['drc', 'stl', 'ply', 'off', 'gii'],
     'open': ['glb-none', 'stl', '3mf'],
     'lods': ['glb-none', 'glb-draco'],
     'distances': ['glb-none', 'glb-draco'],
@@ -80,6 +81,11 @@ def describe(files, mesh):
     for file in files:
         labels = mesh.get('labels', [])
         file.triangles = sum(label['triangles'] for label in labels) or mesh['triangles']
-        file.vertices = mesh['vertices']
         file.bounds = mesh['bounds']
         file.labels = {label['name']: (label['color'], label['triangles']) for label in labels}
+
+
+def mesher_of(files):
+    """The version of the mesher, as its 3MF files tell it."""
+    with zipfile.ZipFile(next(file.path for file in files if file.kind == '3mf')) as archive:
+        return re.search('isomesh, mesher ([^<]+)<', archive.read('3D/3dmodel.model').decode()).group(1)

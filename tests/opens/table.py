@@ -2,6 +2,7 @@
 import re
 
 import judge
+import reasons
 
 KINDS = ['glb-none', 'glb-quantized', 'glb-meshopt', 'glb-khr-meshopt', 'glb-draco', 'drc', 'stl', 'ply', 'obj', '3mf', 'usda', 'usdz', 'off']
 KINDS += ['vtk', 'vtp', 'gii']
@@ -12,11 +13,17 @@ SPECIAL = {
     'lods': 'two levels of detail',
     'distances': 'distances',
     'head': 'a large surface',
+    'ball': 'one surface',
 }
 
 
 def title(kind):
     return f'`glb`, {kind[4:]}' if kind.startswith('glb') else f'`{kind}`'
+
+
+def main_of(kind):
+    """The file of this kind that the large table is about."""
+    return f'{MAIN.get(kind, "atlas")}-{kind}'
 
 
 def short(cells):
@@ -46,17 +53,17 @@ def table(head, rows):
 def overview(readers, judged):
     rows = []
     for reader, program in readers:
-        found = [judged.get((reader.key, f'{MAIN.get(kind, "atlas")}-{kind}')) for kind in KINDS]
+        found = [judged.get((reader.key, main_of(kind))) for kind in KINDS]
         rows.append([program, *('' if cells is None else short(cells) for cells in found)])
     return table(['program', *map(title, KINDS)], rows)
 
 
 def details(readers, judged, file):
-    """Programs that get the same share a row. Those that open nothing are in the large table."""
+    """Programs that get the same share a row. Those that open nothing of a kind are in the large table."""
     programs = {}
     for reader, program in readers:
         cells = judged.get((reader.key, file))
-        if cells and len(cells) > 1:
+        if cells and (len(cells) > 1 or file != main_of(file.split('-', 1)[1])):
             programs.setdefault(tuple(cells.get(column, ('–', True)) for column in COLUMNS), []).append(program)
     columns = [column for at, column in enumerate(COLUMNS) if any(cells[at][0] != '–' for cells in programs)]
     rows = []
@@ -66,21 +73,41 @@ def details(readers, judged, file):
     return table(['programs', *columns], rows) if rows else []
 
 
-def write(path, readers, files, answers):
-    """Replaces what stands between the marks in the page."""
-    by_name = {file.name: file for file in files}
-    wanted = {(reader.key, file.name) for reader in readers for file in files if file.kind in reader.kinds}
-    judged = {key: judge.cells(by_name[key[1]], answer) for key, answer in answers.items() if key in wanted}
+def versions_of(readers, answers):
+    """{key: version}. Raises ValueError for readers that told none."""
     versions = {key[0]: answer['version'] for key, answer in answers.items() if 'version' in answer}
-    named = [(reader, f'{reader.program} {versions[reader.key]}') for reader in readers if reader.key in versions]
-    lines = ['## Which format in which program', *overview(named, judged), '', '## What arrives']
+    silent = [reader.key for reader in readers if reader.key not in versions]
+    if silent:
+        raise ValueError(f'no version was told by {", ".join(silent)}: not run yet, or broken')
+    return versions
+
+
+def write(path, readers, files, answers, mesher):
+    """Replaces what stands between the marks in the page. Raises ValueError for a bold cell without a reason, a reason without a
+    bold cell, and a reader that told no version."""
+    by_name = {file.name: file for file in files}
+    wanted = {(reader.key, file.name): reader for reader in readers for file in files if file.kind in reader.kinds}
+    answers = {key: answer for key, answer in answers.items() if key in wanted}
+    judged = {key: judge.cells(by_name[key[1]], answer, wanted[key].name) for key, answer in answers.items()}
+    versions = versions_of(readers, answers)
+    named = [(reader, f'{reader.program} {versions[reader.key]}') for reader in readers]
+    bold = {
+        (key, by_name[name].kind, by_name[name].shape, column)
+        for (key, name), cells in judged.items()
+        for column, (_, is_right) in cells.items()
+        if not is_right
+    }
+    dates = sorted({answer['date'] for answer in answers.values()})
+    when = dates[0] if len(dates) == 1 else f'{dates[0]} to {dates[-1]}'
+    lines = [f'Seen on {when}, with files of the mesher {mesher}. [versions.txt](../tests/opens/versions.txt) has the packages.', '']
+    lines += ['## Which format in which program', *overview(named, judged), '', '## Why some cells are bold']
+    lines += table(['file', 'program', 'what it does'], reasons.rows(named, bold, title))
+    lines += ['', '## What arrives']
     for kind in KINDS:
-        lines += ['', f'### {title(kind)}', *details(named, judged, f'{MAIN.get(kind, "atlas")}-{kind}')]
+        lines += ['', f'### {title(kind)}', *details(named, judged, main_of(kind))]
     for file in files:
-        if file.shape in SPECIAL:
+        if file.shape in SPECIAL and file.name != main_of(file.kind):
             lines += ['', f'### {title(file.kind)}: {SPECIAL[file.shape]}', *details(named, judged, file.name)]
     text = path.read_text()
     begin, end = '<!-- tests/opens/run writes from here -->\n', '\n<!-- to here -->'
-    made = re.sub(f'{begin}.*?{end}', lambda _: begin + '\n'.join(lines) + end, text, flags=re.DOTALL)
-    path.write_text(made)
-    return judged
+    path.write_text(re.sub(f'{begin}.*?{end}', lambda _: begin + '\n'.join(lines) + end, text, flags=re.DOTALL))

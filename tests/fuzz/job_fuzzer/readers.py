@@ -50,7 +50,7 @@ def read_stl(data):
     return [Part(faces["points"], numpy.arange(3 * count))]
 
 
-PLY_TYPES = {"float": "<f4", "int": "<i4", "uint": "<u4", "uchar": "u1", "double": "<f8", "short": "<i2", "ushort": "<u2", "char": "i1"}
+PLY_TYPES = {"float": "<f4", "int": "<i4", "uint": "<u4", "uchar": "u1", "uint8": "u1", "double": "<f8", "short": "<i2", "ushort": "<u2", "char": "i1"}
 
 
 def read_ply(data):

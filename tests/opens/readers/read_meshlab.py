@@ -6,14 +6,17 @@ import tempfile
 from report import main, package_version, said, surface_of_obj
 
 
-def read(path, _):
+def read(path, suffix):
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, 'out.obj')
-        text = said('xvfb-run', '-a', 'meshlabserver', '-i', path, '-o', out)
+        # vc: with the colours of vertices.
+        text = said('xvfb-run', '-a', 'meshlabserver', '-i', path, '-o', out, '-m', 'vc')
         if not os.path.exists(out):
             raise RuntimeError(text.strip().splitlines()[-1])
         found = surface_of_obj(out)
     vertices, triangles = re.search(r'loaded has (\d+) vn (\d+) fn', text).groups()
+    if suffix != 'ply':
+        del found['colours']
     return [{**found, 'triangles': int(triangles), 'vertices': int(vertices)}]
 
 

@@ -18,7 +18,7 @@ def read(path, _):
         out = os.path.join(folder, 'out.stl')
         said('prusa-slicer', '--export-stl', '--dont-arrange', '--no-ensure-on-bed', '--output', out, path)
         found = surface_of_stl(out)
-    return [{**found, 'triangles': sum(counts), 'vertices': None}]
+    return [{**found, 'triangles': sum(counts), 'vertices': None, 'note': 'with `--no-ensure-on-bed`'}]
 
 
 main(package_version('prusa-slicer'), read)

@@ -48,7 +48,8 @@ def read(path, suffix):
     reader.Update()
     if errors:
         raise RuntimeError(told.GetOutput() or 'an error')
-    return [surface_of(reader.GetOutput())]
+    # An OBJ's names would be here as arrays.
+    return [surface_of(reader.GetOutput(), **({'name': None} if suffix == 'obj' else {}))]
 
 
 main(vtk.vtkVersion().GetVTKVersion(), read)

@@ -7,14 +7,16 @@ import vtkDracoReader from '@kitware/vtk.js/IO/Geometry/DracoReader.js';
 import vtkOBJReader from '@kitware/vtk.js/IO/Misc/OBJReader.js';
 import vtkGLTFImporter from '@kitware/vtk.js/IO/Geometry/GLTFImporter.js';
 import draco3d from 'draco3d';
-import { hex, bytesOf, main, surface } from './report.mjs';
+import { hex, hexesOfBytes, bytesOf, main, surface } from './report.mjs';
 
 function surfaceOf(poly, more, matrix) {
   const polys = poly.getPolys().getNumberOfCells();
   const normals = Boolean(poly.getPointData().getNormals());
   const labels = poly.getCellData().getArrayByName('label')?.getData();
   const values = poly.getPointData().getArrays().map((array) => array.getName());
-  return surface(poly.getPoints().getData(), polys, { normals, labels: labels && [...new Set(labels)].map(Number), values, ...more }, matrix);
+  const rgb = poly.getPointData().getArrayByName('RGB')?.getData();
+  const told = { normals, labels: labels && [...new Set(labels)].map(Number), colours: rgb && hexesOfBytes(rgb, 3), values, ...more };
+  return surface(poly.getPoints().getData(), polys, told, matrix);
 }
 
 async function scene(bytes) {

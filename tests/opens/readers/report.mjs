@@ -49,6 +49,12 @@ export function hex(values) {
   return `#${values.map((v) => Math.round(255 * v).toString(16).padStart(2, '0')).join('')}`;
 }
 
+// The colours of pixels of so many bytes, once each.
+export function hexesOfBytes(bytes, stride) {
+  const all = Array.from({ length: bytes.length / stride }, (_, at) => hex([...bytes.slice(stride * at, stride * at + 3)].map((v) => v / 255)));
+  return [...new Set(all)];
+}
+
 // `read` takes the path and its suffix, and returns surfaces.
 export async function main(name, read) {
   const path = process.argv[2];

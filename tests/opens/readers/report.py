@@ -3,6 +3,7 @@
 """
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -47,10 +48,24 @@ def surface_of_stl(path):
 
 
 def surface_of_obj(path):
-    """An OBJ that a program wrote."""
+    """An OBJ that a program wrote, with the colours that some programs put behind the coordinates."""
     with open(path, encoding='utf-8', errors='replace') as file:
         lines = [line.split() for line in file]
-    return surface([line[1:4] for line in lines if line[:1] == ['v']], sum(line[:1] == ['f'] for line in lines))
+    rows = [line[1:] for line in lines if line[:1] == ['v']]
+    colours = {hex_of(row[3:6]) for row in rows if len(row) > 5}
+    return surface([row[:3] for row in rows], sum(line[:1] == ['f'] for line in lines), colours=sorted(colours))
+
+
+def surface_of_ply(path):
+    """A PLY that a program wrote as text, with triangles only."""
+    with open(path, encoding='utf-8', errors='replace') as file:
+        text = file.read()
+    head, body = text.split('end_header\n')
+    counts = dict(re.findall(r'element (\w+) (\d+)', head))
+    names = re.findall(r'property (?!list)\w+ (\w+)', head.split('element face')[0])
+    rows = [dict(zip(names, line.split())) for line in body.splitlines()[: int(counts['vertex'])]]
+    colours = {hex_of([int(row[name]) / 255 for name in ('red', 'green', 'blue')]) for row in rows if 'red' in row}
+    return surface([[row[axis] for axis in 'xyz'] for row in rows], counts['face'], colours=sorted(colours))
 
 
 def main(version, read, path=None):

@@ -243,7 +243,7 @@ TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
 TEST_F(LabelFilesTest, PlyHasEveryLabelsOwnVerticesWithItsColourAndValue) {
   const std::string ply = encoded(MeshFormat::kPly);
   const std::string end =
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int label\n"
+      "property uint8 red\nproperty uint8 green\nproperty uint8 blue\nproperty int label\n"
       "element face " +
       std::to_string(faces_of_all()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
   const std::size_t found = ply.find(end);

@@ -1,7 +1,8 @@
 """isomesh's PLY files: binary, little-endian, with float coordinates and three corners per face.
 
 A label is a property of vertices, because each label has vertices of its own. Arrays whose labels share vertices, or
-without colours, have it as a property of faces, as the server's files had it before they had colours."""
+without colours, have it as a property of faces, as the server's files had it before they had colours. The first files
+with colours called their type uchar."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ _HEADER_END = b"end_header\n"
 _LONGEST_HEADER = 1 << 22  # with a comment for each of 65535 labels
 _COMMENT = "comment isomesh, millimetres, "
 _POSITION = "".join(f"property float {axis}\n" for axis in "xyz")
-_COLOR = "".join(f"property uchar {channel}\n" for channel in ("red", "green", "blue"))
+_COLOR = "".join(f"property uint8 {channel}\n" for channel in ("red", "green", "blue"))
 _CORNERS = "property list uchar uint vertex_indices\n"
 _LABEL = {"i": "property int label\n", "I": "property uint label\n"}
 
@@ -182,7 +183,8 @@ def _header_of(text: bytes) -> _Header:
             properties[element] = ""
         elif line.startswith("property ") and properties:
             properties[list(properties)[-1]] += line + "\n"
-    vertex, face = properties.get("vertex", ""), properties.get("face", "")
+    face = properties.get("face", "")
+    vertex = properties.get("vertex", "").replace("property uchar ", "property uint8 ")
     has_colors = vertex.startswith(_POSITION + _COLOR)
     # Labels are the only other property.
     rest = {"vertex": vertex[len(_POSITION) + (len(_COLOR) if has_colors else 0) :], "face": face[len(_CORNERS) :]}
