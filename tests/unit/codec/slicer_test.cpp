@@ -51,7 +51,8 @@ class PrusaSlicerTest : public test::LabelFilesTest {
   std::vector<std::string> told(const std::string& name, const std::string& bytes) const {
     std::vector<std::string> values;
     const std::string prefix = name + " = ";
-    for (const std::string_view line : lines(run({"--info"}, bytes).output)) {
+    const test::Finished finished = run({"--info"}, bytes);
+    for (const std::string_view line : lines(finished.output)) {
       if (line.starts_with(prefix)) values.emplace_back(line.substr(prefix.size()));
     }
     return values;
