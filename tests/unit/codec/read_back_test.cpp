@@ -156,7 +156,9 @@ TEST_P(ReadBackGlb, WithoutTheEndOfItsArraysIsRefused) {
     const auto word = static_cast<std::uint32_t>(value);
     std::memcpy(bytes.data() + at, &word, sizeof word);
   };
-  for (std::size_t bytes = file.size() - 4; bytes >= binary; bytes -= 4) {
+  constexpr std::size_t kCuts = 300;
+  const std::size_t step = 4 * (1 + (file.size() - binary) / (4 * kCuts));
+  for (std::size_t bytes = file.size() - 4; bytes >= binary; bytes -= step) {
     std::string shorter = file.substr(0, bytes);
     put(shorter, 8, bytes);
     put(shorter, binary - 8, bytes - binary);
