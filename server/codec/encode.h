@@ -65,9 +65,9 @@ struct FileContent {
 // Encoders of one format each. They throw Error kCancelled. A surface of labels contains each
 // label's own surface, complete and oriented outward: a wall between two labels occurs once for
 // each. An encoder returns the topology of one surface if it found it on the way; it equals
-// measure_topology's. Positions are converted to the content's space. Except for Draco,
-// GLB and formats that hold a label's surface, files are streamed in a few megabytes of memory. The
-// bytes never depend on the number of threads.
+// measure_topology's. Positions are converted to the content's space. Except for Draco, GLB and
+// formats that hold a label's surface, files are streamed in a few megabytes of memory. The bytes
+// never depend on the number of threads.
 using Encoder = std::optional<mesh::Topology>(const FileContent& content,
                                               const mesh::Context& context, const Sink& sink);
 

@@ -342,6 +342,17 @@ TEST_F(Fetch, GivesTheReasonOfAJobThatFailed) {
   EXPECT_STREQ(error.what(), "the mesh has too many triangles");
 }
 
+// Announces the part of the mesh that the request's head asks for, and sends at most `most` bytes
+// of it.
+void send_mesh(int socket, const std::string& mesh, const std::string& head, std::size_t most) {
+  const std::size_t at = head.find("Range: bytes=");
+  const bool is_range = at != std::string::npos;
+  const std::string rest = mesh.substr(is_range ? std::stoul(head.substr(at + 13)) : 0);
+  test::send_text(socket, std::string("HTTP/1.1 ") + (is_range ? "206 Partial Content" : "200 OK") +
+                              "\r\nContent-Length: " + std::to_string(rest.size()) + "\r\n\r\n" +
+                              rest.substr(0, most));
+}
+
 // A server that knows no ranges sends the whole file again.
 TEST_F(Fetch, GoesOnWhereTheConnectionBrokeOrStartsOver) {
   const std::string mesh = pattern(200'000);
@@ -353,13 +364,7 @@ TEST_F(Fetch, GoesOnWhereTheConnectionBrokeOrStartsOver) {
         return test::answer(socket, "200 OK", to_json(finished_job("7", mesh)));
       }
       asked.push_back(head);
-      const std::size_t at = head.find("Range: bytes=");
-      const bool is_range = knows_ranges && at != std::string::npos;
-      const std::string rest = mesh.substr(is_range ? std::stoul(head.substr(at + 13)) : 0);
-      test::send_text(socket, std::string("HTTP/1.1 ") +
-                                  (is_range ? "206 Partial Content" : "200 OK") +
-                                  "\r\nContent-Length: " + std::to_string(rest.size()) +
-                                  "\r\n\r\n" + rest.substr(0, asked.size() < 3 ? 70'000 : -1));
+      send_mesh(socket, mesh, knows_ranges ? head : "", asked.size() < 3 ? 70'000 : -1);
     });
     Client({.server = server.url()}).fetch("7", MeshFormat::kDrc, folder_ / "mesh.drc");
     EXPECT_TRUE(test::read_file(folder_ / "mesh.drc") == mesh);
@@ -386,13 +391,7 @@ TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
         if (head.find("mesh.obj") == std::string::npos) {
           return test::answer(socket, "200 OK", to_json(finished_job("7", mesh, MeshFormat::kObj)));
         }
-        const std::size_t at = head.find("Range: bytes=");
-        const bool is_range = knows_ranges && at != std::string::npos;
-        const std::string rest = mesh.substr(is_range ? std::stoul(head.substr(at + 13)) : 0);
-        test::send_text(socket, std::string("HTTP/1.1 ") +
-                                    (is_range ? "206 Partial Content" : "200 OK") +
-                                    "\r\nContent-Length: " + std::to_string(rest.size()) +
-                                    "\r\n\r\n" + rest.substr(0, ++asked < 3 ? 20 : -1));
+        send_mesh(socket, mesh, knows_ranges ? head : "", ++asked < 3 ? 20 : -1);
       });
       Client({.server = server.url()}).fetch("7", MeshFormat::kObj, folder_ / "left hip.obj");
       std::string expected = mesh;

@@ -1,8 +1,7 @@
 """isomesh's PLY files: binary, little-endian, with float coordinates and three corners per face.
 
 A label is a property of vertices, because each label has vertices of its own. Arrays whose labels share vertices, or
-without colours, have it as a property of faces, as the server's files had it before they had colours. The first files
-with colours called their type uchar."""
+without colours, have it as a property of faces, as the server's files had it before they had colours."""
 
 from __future__ import annotations
 
@@ -183,8 +182,7 @@ def _header_of(text: bytes) -> _Header:
             properties[element] = ""
         elif line.startswith("property ") and properties:
             properties[list(properties)[-1]] += line + "\n"
-    face = properties.get("face", "")
-    vertex = properties.get("vertex", "").replace("property uchar ", "property uint8 ")
+    vertex, face = properties.get("vertex", ""), properties.get("face", "")
     has_colors = vertex.startswith(_POSITION + _COLOR)
     # Labels are the only other property.
     rest = {"vertex": vertex[len(_POSITION) + (len(_COLOR) if has_colors else 0) :], "face": face[len(_CORNERS) :]}
