@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/mesh/simplify/simplify.h"
+#include "server/mesh/collapse/simplify.h"
 
 namespace isomesh::codec {
 namespace {

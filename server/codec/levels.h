@@ -24,7 +24,7 @@ auto use_in_space(const mesh::Mesh& mesh, Space space, Use use) {
 }
 
 // Simplifies the mesh in place to about that many triangles, without an error bound
-// (server/mesh/simplify/simplify.h). More remain if its boundary or junction curves require them.
+// (server/mesh/collapse/simplify.h). More remain if its boundary or junction curves require them.
 // Needs the memory of simplification. Throws Error kCancelled.
 void coarsen(std::uint64_t triangles, const mesh::Context& context, mesh::Mesh& mesh);
 

@@ -8,11 +8,11 @@
 #include "proto/samples.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
-#include "server/mesh/bound/bound.h"
+#include "server/mesh/collapse/bound.h"
+#include "server/mesh/collapse/gradient_normals.h"
+#include "server/mesh/collapse/simplify.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/shapes.h"
-#include "server/mesh/simplify/gradient_normals.h"
-#include "server/mesh/simplify/simplify.h"
 #include "server/mesh/smooth/smooth.h"
 
 namespace isomesh::jobs {

@@ -5,13 +5,13 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/bound/clusters.h"
-#include "server/mesh/bound/field.h"
-#include "server/mesh/bound/vec.h"
+#include "server/mesh/collapse/clusters.h"
+#include "server/mesh/collapse/field.h"
+#include "server/mesh/collapse/vec.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
 
-namespace isomesh::mesh::bound {
+namespace isomesh::mesh::collapse {
 namespace {
 
 // Positions of a regularised surface's vertices: one per cluster, the mean of its crossings, then
@@ -68,4 +68,4 @@ TEST(BoundClustersTest, AreThoseOfTheRegularisedSurface) {
 }
 
 }  // namespace
-}  // namespace isomesh::mesh::bound
+}  // namespace isomesh::mesh::collapse

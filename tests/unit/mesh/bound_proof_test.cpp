@@ -5,14 +5,14 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/bound/bound.h"
-#include "server/mesh/bound/collapses.h"
-#include "server/mesh/bound/proof.h"
-#include "server/mesh/bound/start.h"
+#include "server/mesh/collapse/bound.h"
+#include "server/mesh/collapse/collapses.h"
+#include "server/mesh/collapse/proof.h"
+#include "server/mesh/collapse/start.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
 
-namespace isomesh::mesh::bound {
+namespace isomesh::mesh::collapse {
 namespace {
 
 constexpr double kReach = 0.2;
@@ -43,10 +43,10 @@ struct Scene {
   Scene(const Scene&) = delete;
 
   Proof prove() const {
-    return bound::prove(*field,
-                        {crossings.all, mesh.triangles.span(), components, tube.vertices,
-                         tube.triangles, tube.origins},
-                        {});
+    return collapse::prove(*field,
+                           {crossings.all, mesh.triangles.span(), components, tube.vertices,
+                            tube.triangles, tube.origins},
+                           {});
   }
 };
 
@@ -139,4 +139,4 @@ TEST(BoundProofTest, TellsThatAVertexWasMoved) {
 }
 
 }  // namespace
-}  // namespace isomesh::mesh::bound
+}  // namespace isomesh::mesh::collapse

@@ -15,15 +15,15 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "server/mesh/bound/bound.h"
-#include "server/mesh/bound/clear.h"
-#include "server/mesh/bound/fast_clear-inl.h"
-#include "server/mesh/bound/one_sign.h"
+#include "server/mesh/collapse/bound.h"
+#include "server/mesh/collapse/clear.h"
+#include "server/mesh/collapse/fast_clear-inl.h"
+#include "server/mesh/collapse/one_sign.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace isomesh::mesh::bound::HWY_NAMESPACE {
+namespace isomesh::mesh::collapse::HWY_NAMESPACE {
 
 bool is_clear_in_lanes(const Field& field, const std::array<Vecf, 3>& p, Side side) {
   FastClear clear(field);
@@ -38,11 +38,11 @@ bool is_clear_in_lanes(const Field& field, const std::array<Vecf, 3>& p, Side si
          clear.inside(a, b, c, sign);
 }
 
-}  // namespace isomesh::mesh::bound::HWY_NAMESPACE
+}  // namespace isomesh::mesh::collapse::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace isomesh::mesh::bound {
+namespace isomesh::mesh::collapse {
 namespace {
 
 HWY_EXPORT(is_clear_in_lanes);
@@ -178,5 +178,5 @@ TEST(BoundSignsTest, GiveTheSameMeshOnEachInstructionSet) {
 }
 
 }  // namespace
-}  // namespace isomesh::mesh::bound
+}  // namespace isomesh::mesh::collapse
 #endif  // HWY_ONCE

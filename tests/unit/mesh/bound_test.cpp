@@ -1,4 +1,4 @@
-#include "server/mesh/bound/bound.h"
+#include "server/mesh/collapse/bound.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "server/mesh/simplify/gradient_normals.h"
+#include "server/mesh/collapse/gradient_normals.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/bound/bound.h"
+#include "server/mesh/collapse/bound.h"
 #include "server/mesh/measure/normals.h"
 #include "server/mesh/points.h"
 #include "tests/support/kernels.h"

@@ -1,4 +1,4 @@
-#include "server/mesh/simplify/simplify.h"
+#include "server/mesh/collapse/simplify.h"
 
 #include <algorithm>
 #include <array>

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/collapse/simplify.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/measure/distance.h"
-#include "server/mesh/simplify/simplify.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/any_threads.h"
 #include "tests/unit/mesh/separated.h"
