@@ -37,6 +37,10 @@ struct Mesh {
   // those.
   std::vector<std::uint64_t> on_border;
 
+  // One bit per vertex that extraction made, of a mesh that has lost components since
+  // (components.h): set if it is still there. Empty: all are.
+  std::vector<std::uint64_t> kept;
+
   // One bit per vertex for walls between several labels (separate.h): set where more than two walls
   // meet. Empty for a surface with one inside and one outside.
   std::vector<std::uint64_t> on_line;

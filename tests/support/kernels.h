@@ -69,6 +69,7 @@ inline mesh::Mesh copy_of(const mesh::Mesh& other) {
   copy.layer_vertices = other.layer_vertices;
   copy.layer_triangles = other.layer_triangles;
   copy.on_border = other.on_border;
+  copy.kept = other.kept;
   copy.on_line = other.on_line;
   copy.normals = other.normals;
   return copy;

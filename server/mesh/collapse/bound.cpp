@@ -69,7 +69,7 @@ void restore(const StartSurface& surface, const Components& components,
   for (const auto& [a, b, c] : surface.mesh.triangles) {
     if (!goes_back(a)) continue;
     tube.triangles.push_back({number[a], number[b], number[c]});
-    if (!surface.metric.is_left_handed()) {
+    if (!surface.is_wound_as_tube(a)) {
       std::swap(tube.triangles.back()[1], tube.triangles.back()[2]);
     }
   }
@@ -107,13 +107,16 @@ BoundedMesh describe(const Metric& metric, const Tube& tube) {
 }
 
 // Gives the mesh the tube's surface, at those places.
-void write(const Metric& metric, std::span<const Vec3> places, const Tube& tube, Mesh& mesh) {
+void write(const StartSurface& surface, std::span<const Vec3> places, const Tube& tube,
+           Mesh& mesh) {
   for (std::size_t v = 0; v < places.size(); ++v) mesh.positions[tube.origins[v]] = places[v];
   std::vector<Triangle> triangles;
   triangles.reserve(tube.triangles.size());
   for (const auto& [a, b, c] : tube.triangles) {
     triangles.push_back({tube.origins[a], tube.origins[b], tube.origins[c]});
-    if (!metric.is_left_handed()) std::swap(triangles.back()[1], triangles.back()[2]);
+    if (!surface.is_wound_as_tube(tube.origins[a])) {
+      std::swap(triangles.back()[1], triangles.back()[2]);
+    }
   }
   std::vector<WallSides> no_sides;
   replace_triangles(triangles, no_sides, mesh);
@@ -134,7 +137,7 @@ BoundedMesh deliver(const StartSurface& surface, const Tube& tube, double shift_
   if (!(result.bound_mm <= max_error_mm)) {
     throw Error(ErrorCode::kInternal, "a proven distance is larger than its limit");
   }
-  write(surface.metric, places, tube, mesh);
+  write(surface, places, tube, mesh);
   return result;
 }
 
@@ -172,11 +175,18 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
   if (mesh.triangles.size() == 0) return BoundedMesh();
   const std::uint32_t margin =
       extract.close ? margin_for(Metric(lattice.to_space), options.max_error_mm) : 0;
-  const std::optional<Field> field = make_field(lattice, extract, margin, context);
+  std::optional<Field> field = make_field(lattice, extract, margin, context);
   if (!field) return unproven("Single precision cannot hold the samples' differences.");
-  const Crossings crossings = crossings_of(*field, context);
+  Crossings crossings = crossings_of(*field, context);
+  std::vector<std::uint8_t> turned;
+  if (!mesh.kept.empty()) {
+    if (mesh.kept.size() != (crossings.all.size() + kFlagBits - 1) / kFlagBits) {
+      return unproven("The surface is not one of the samples.");
+    }
+    turned = leave_out(mesh.kept, context, *field, crossings);
+  }
   if (crossings.all.size() != mesh.positions.size()) {
-    return unproven("The surface is not the whole one of the samples.");
+    return unproven("The surface is not one of the samples.");
   }
   const Metric metric = Metric(lattice.to_space).before(margin);
   const double least = kLeastReach * options.max_error_mm;
@@ -193,7 +203,8 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
                                 mesh,
                                 reach,
                                 options.is_smoothed,
-                                0.5 * Placement::nearest_share(lattice.dims, lattice.to_space)};
+                                0.5 * Placement::nearest_share(lattice.dims, lattice.to_space),
+                                turned};
   std::optional<Tube> tube =
       make_start(surface, find_clusters(lattice, extract, *field, crossings, context), context);
   if (!tube) return unproven("Samples differ too little from the iso-value.");

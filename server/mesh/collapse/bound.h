@@ -49,8 +49,9 @@ struct BoundedMesh {
 // cell that is not regularised.
 bool has_bound(const ExtractOptions& options);
 
-// Simplifies `mesh` in place, which extract_surface made of the lattice with these options, whole,
-// and which may have been smoothed since, by less than the error. Its boundary stays on the faces
+// Simplifies `mesh` in place, which extract_surface made of the lattice with these options, and
+// which may have lost components (Mesh::kept) and have been smoothed since, by less than the error.
+// Distances are those from the surface without these components. Its boundary stays on the faces
 // of the volume and keeps its vertices; the caps of a closed one stay in the faces. The mesh keeps
 // its topology where components are larger than the error, and what Mesh says of layers. The same
 // mesh for any number of threads.

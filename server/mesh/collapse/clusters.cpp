@@ -45,19 +45,29 @@ class PlaneClusters {
     while (left != 0) {
       const Directions component = links_.facts(parity, left).first();
       left &= ~component;
+      if (!is_crossed(number, links_.directions()[first_of(component)])) continue;  // left out
       for (Directions rest = component; rest != 0; rest &= rest - 1) {
-        const auto d = static_cast<std::size_t>(std::countr_zero(rest));
-        clusters.crossings.push_back(crossing(number, links_.directions()[d]));
+        clusters.crossings.push_back(crossing(number, links_.directions()[first_of(rest)]));
       }
       std::sort(clusters.crossings.begin() + clusters.begin.back(), clusters.crossings.end());
       clusters.begin.push_back(static_cast<std::uint32_t>(clusters.crossings.size()));
     }
   }
 
+  static std::size_t first_of(Directions directions) {
+    return static_cast<std::size_t>(std::countr_zero(directions));
+  }
+  std::size_t owner(std::size_t sample, const LinkDirection& direction) const {
+    return sample - static_cast<std::size_t>(sample_offset(field_.dims, direction.corner));
+  }
+  const PlaneCrossings& plane_of(std::size_t owner) const { return owner < begin_ ? below_ : own_; }
+  bool is_crossed(std::size_t sample, const LinkDirection& direction) const {
+    const std::size_t from = owner(sample, direction);
+    return plane_of(from).is_crossed(from, direction.place);
+  }
   std::uint32_t crossing(std::size_t sample, const LinkDirection& direction) const {
-    const std::size_t owner =
-        sample - static_cast<std::size_t>(sample_offset(field_.dims, direction.corner));
-    return (owner < begin_ ? below_ : own_).number_of(owner, direction.place);
+    const std::size_t from = owner(sample, direction);
+    return plane_of(from).number_of(from, direction.place);
   }
 
   const Field& field_;

@@ -18,7 +18,7 @@ namespace isomesh::mesh::collapse::HWY_NAMESPACE {
 template <class Test>
 class FaultFinder {
  public:
-  explicit FaultFinder(const TubeStart& start) : start_(start), clear_(start.field) {}
+  explicit FaultFinder(const TubeStart& start) : start_(start), clear_(start.surface.field) {}
 
   bool is_at_fault(const Triangle& triangle) {
     const auto& [a, b, c] = triangle;
@@ -100,7 +100,7 @@ HWY_EXPORT(find_faults_of_five);
 
 void find_faults(const TubeStart& start, std::span<const std::uint32_t> triangles,
                  std::vector<std::uint32_t>& faults) {
-  if (start.field.scheme == Scheme::kSix) {
+  if (start.surface.field.scheme == Scheme::kSix) {
     HWY_DYNAMIC_DISPATCH(find_faults_of_six)(start, triangles, faults);
   } else {
     HWY_DYNAMIC_DISPATCH(find_faults_of_five)(start, triangles, faults);

@@ -6,16 +6,14 @@
 #include <span>
 #include <vector>
 
-#include "server/mesh/collapse/field.h"
+#include "server/mesh/collapse/start.h"
 #include "server/mesh/collapse/tube.h"
 
 namespace isomesh::mesh::collapse {
 
 struct TubeStart {
-  const Field& field;
+  const StartSurface& surface;
   const Tube& tube;
-  std::span<const Triangle> extracted;       // between crossings
-  bool is_left_handed = false;               // then those are wound as the tube's
   std::span<const std::uint32_t> vertex;     // of the tube, by crossing
   std::span<const std::uint8_t> is_unclear;  // by vertex: in T+ or T-
   std::span<const std::uint8_t> stepped;     // by vertex: on its lattice edge
@@ -23,8 +21,8 @@ struct TubeStart {
   // The corners in the tube of triangle t of S. The triangle is empty if two of its crossings are
   // one vertex.
   Triangle corners(std::size_t t) const {
-    const auto& [a, b, c] = extracted[t];
-    if (is_left_handed) return {vertex[a], vertex[b], vertex[c]};
+    const auto& [a, b, c] = surface.mesh.triangles[t];
+    if (surface.is_wound_as_tube(a)) return {vertex[a], vertex[b], vertex[c]};
     return {vertex[a], vertex[c], vertex[b]};
   }
 };

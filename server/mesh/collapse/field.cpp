@@ -129,6 +129,56 @@ Crossings crossings_of(const Field& field, const Context& context) {
   return crossings;
 }
 
+std::vector<std::uint8_t> leave_out(std::span<const std::uint64_t> kept, const Context& context,
+                                    Field& field, Crossings& crossings) {
+  const Dims dims = field.dims;
+  const std::size_t plane = std::size_t{dims.x} * dims.y;
+  // A sample is turned if a way from the first one crosses what is left out an odd number of times:
+  // any way, here along z, then y, then x.
+  std::vector<std::vector<bool>> is_turned(dims.z, std::vector<bool>(plane, false));
+  std::vector<std::uint8_t> next_turns(dims.z, 0);  // between planes
+  parallel_for(context, dims.z, [&](std::size_t z) {
+    std::vector<bool>& turned = is_turned[z];
+    std::size_t number = crossings.layer_begin[z];
+    visit_crossed(field, static_cast<std::uint32_t>(z),
+                  [&](std::size_t sample, unsigned set, const CellSplit&) {
+                    const std::size_t at = sample - z * plane;
+                    for (; set != 0; set &= set - 1, ++number) {
+                      if ((kept[number / kFlagBits] >> (number % kFlagBits) & 1) != 0) continue;
+                      const auto direction = static_cast<unsigned>(std::countr_zero(set));
+                      if (direction == 1) turned[at + 1] = true;
+                      if (direction == 2 && at % dims.x == 0) turned[at + dims.x] = true;
+                      if (direction == 4 && at == 0) next_turns[z] = 1;
+                    }
+                  });
+    for (std::size_t y = 1; y < dims.y; ++y) {
+      turned[y * dims.x] = turned[y * dims.x] != turned[(y - 1) * dims.x];
+    }
+    for (std::size_t at = 0; at < plane; ++at) {
+      if (at % dims.x != 0) turned[at] = turned[at] != turned[at - 1];
+    }
+  });
+  bool is_plane_turned = false;
+  for (std::size_t z = 0; z < dims.z; ++z) {
+    if (is_plane_turned) is_turned[z].flip();
+    is_plane_turned = is_plane_turned != (next_turns[z] != 0);
+  }
+  parallel_for(context, dims.z, [&](std::size_t z) {
+    float* const values = field.values.data() + z * plane;
+    for (std::size_t at = 0; at < plane; ++at) {
+      if (is_turned[z][at]) values[at] = -values[at];
+    }
+  });
+  crossings = crossings_of(field, context);
+  std::vector<std::uint8_t> flags(crossings.all.size(), 0);
+  for_each(context, flags.size(), [&](std::size_t v) {
+    const std::uint32_t inside = crossings.all[v].inside;
+    flags[v] = is_turned[inside / plane][inside % plane] ? 1 : 0;
+  });
+  if (std::ranges::find(flags, 1) == flags.end()) flags.clear();
+  return flags;
+}
+
 PlaneCrossings::PlaneCrossings(const Field& field, const Crossings& crossings, std::uint32_t z)
     : begin_(std::size_t{z} * field.dims.x * field.dims.y),
       samples_(std::size_t{field.dims.x} * field.dims.y) {

@@ -78,13 +78,24 @@ struct Crossings {
 
 Crossings crossings_of(const Field& field, const Context& context);
 
+// Makes S consist of some of its components: those of the crossings whose bits are set in `kept`
+// (Mesh::kept). A component of S parts the volume, and has a tetrahedron that it crosses for
+// itself. So where it is left out, F keeps its size and takes the other sign on one side. Returns a
+// flag for each crossing that is left: set if its ends have changed their signs, so that triangles
+// of S now face the inside. Empty: none has.
+std::vector<std::uint8_t> leave_out(std::span<const std::uint64_t> kept, const Context& context,
+                                    Field& field, Crossings& crossings);
+
 // The numbers of the crossings that one plane's samples own.
 class PlaneCrossings {
  public:
   PlaneCrossings(const Field& field, const Crossings& crossings, std::uint32_t z);
 
-  // The number of the crossing on a sample's edge of a direction 1..7. The sample must be one of
-  // this plane, and the edge must be crossed.
+  // The number of the crossing on a sample's edge of a direction 1..7, which must be crossed. The
+  // sample must be one of this plane.
+  bool is_crossed(std::size_t sample, unsigned direction) const {
+    return (samples_[sample - begin_].set >> direction & 1) != 0;
+  }
   std::uint32_t number_of(std::size_t sample, unsigned direction) const {
     const Sample& owner = samples_[sample - begin_];
     const unsigned before = owner.set & ((1U << direction) - 1);

@@ -85,6 +85,7 @@ void replace_triangles(std::vector<Triangle>& triangles, std::vector<WallSides>&
     numbers[v] = count++;
   }
   mesh.positions.shrink(count);
+  mesh.kept.clear();
   if (!mesh.normals.empty()) mesh.normals.resize(count);
   take_flags(mesh.on_border, numbers, count);
   take_flags(mesh.on_line, numbers, count);

@@ -104,8 +104,7 @@ class Starter {
         vertex_(surface.crossings.size(), kNone),
         look_(layers_.size() - 1),
         faults_(layers_.size() - 1),
-        start_{field_, tube_, surface.mesh.triangles.span(), metric_.is_left_handed(), vertex_,
-               {},     {}} {}
+        start_{surface, tube_, vertex_, {}, {}} {}
 
   std::optional<Tube> run() {
     set_up();
@@ -356,7 +355,7 @@ class Starter {
 }  // namespace
 
 Vertex on_lattice_edge(const StartSurface& surface, std::size_t vertex) {
-  const auto& [field, crossings, metric, mesh, reach_mm, is_moved, rounding] = surface;
+  const auto& [field, crossings, metric, mesh, reach_mm, is_moved, rounding, turned] = surface;
   const Crossing& crossing = crossings[vertex];
   if (field.margin != 0 && field.is_phantom(crossing.outside)) return on_cap(surface, vertex);
   const Vecd inside = field.place(crossing.inside);

@@ -28,6 +28,12 @@ struct StartSurface {
   double reach_mm = 0;    // how far T+ and T- are from T
   bool is_moved = false;  // whether vertices are not on their lattice edges any more
   double rounding = 0;    // how far from a face of the volume a vertex in it may be, in samples
+  std::span<const std::uint8_t> turned = {};  // by crossing, as leave_out returns it
+
+  // True if a triangle of S with that corner has the order of the tube's.
+  bool is_wound_as_tube(std::uint32_t corner) const {
+    return metric.is_left_handed() != (!turned.empty() && turned[corner] != 0);
+  }
 };
 
 // Nothing where single precision cannot tell the tube from S. The same for any number of threads.

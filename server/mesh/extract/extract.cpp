@@ -58,6 +58,7 @@ void make_room(const SurfaceCount& count, const LatticeToSpace& to_space, bool c
   mesh.layer_triangles = count.layer_triangles;
   mesh.positions.resize_for_overwrite(count.vertices());
   mesh.triangles.resize_for_overwrite(count.triangles());
+  mesh.kept.clear();
   mesh.on_border.assign(close ? (count.vertices() + kFlagBits - 1) / kFlagBits : 0, 0);
   mesh.on_line.clear();
   mesh.normals.clear();

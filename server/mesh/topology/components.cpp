@@ -138,8 +138,26 @@ void set_flag(std::vector<std::uint64_t>& flags, std::size_t at, bool value) {
   flags[at / kFlagBits] = (flags[at / kFlagBits] & ~bit) | (value ? bit : 0);
 }
 
+// Clears the flags of those that do not stay.
+void clear_kept(const std::vector<bool>& kept, const Buffer<std::uint32_t>& of_vertex,
+                std::vector<std::uint64_t>& flags) {
+  if (flags.empty()) {
+    flags.assign((of_vertex.size() + kFlagBits - 1) / kFlagBits, ~std::uint64_t{0});
+    if (of_vertex.size() % kFlagBits != 0) {
+      flags.back() = (std::uint64_t{1} << (of_vertex.size() % kFlagBits)) - 1;
+    }
+  }
+  std::size_t v = 0;
+  for (std::uint64_t& word : flags) {
+    for (std::uint64_t left = word; left != 0; left &= left - 1, ++v) {
+      if (!kept[of_vertex[v]]) word &= ~(left & (0 - left));
+    }
+  }
+}
+
 // Moves the vertices that stay to the front; `of_vertex` becomes the new number of each.
 void keep_vertices(const std::vector<bool>& kept, Buffer<std::uint32_t>& of_vertex, Mesh& mesh) {
+  clear_kept(kept, of_vertex, mesh.kept);
   std::uint32_t next = 0;
   std::size_t v = 0;
   for (std::size_t layer = 0; layer < mesh.layers(); ++layer) {

@@ -129,8 +129,6 @@ TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
   };
   EXPECT_EQ(why([](auto& job) { job.scheme = SchemeName::kBcc; }),
             "The proof is for schemes 5 and 6.");
-  EXPECT_EQ(why([](auto& job) { job.components.keep = 1; }),
-            "The proof is for all components together.");
   EXPECT_EQ(why([](auto& job) { job.max_error_mm.reset(); }), "A proof needs max_error_mm.");
 }
 

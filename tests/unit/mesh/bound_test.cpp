@@ -14,6 +14,7 @@
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/smooth/smooth.h"
+#include "server/mesh/topology/components.h"
 #include "server/mesh/topology/topology.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/exact_distance.h"
@@ -47,12 +48,12 @@ std::optional<BoundedMesh> simplified(const test::SampleVolume<T>& volume,
   return bound;
 }
 
-// Exact distances of random points, both ways, by independent code.
+// Exact distances of random points, both ways, by independent code. `plain`: the whole surface or
+// some components of it.
 template <class T>
-void expect_within_by_scheme(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
-                             double error_mm) {
-  const Mesh plain = test::extracted(volume, extract);
-  Mesh mesh = test::extracted(volume, extract);
+void expect_within_of(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
+                      double error_mm, const Mesh& plain) {
+  Mesh mesh = test::copy_of(plain);
   const auto bound = simplified(volume, extract, {.max_error_mm = error_mm}, mesh);
   ASSERT_TRUE(bound);
   EXPECT_LE(bound->bound_mm, error_mm);
@@ -70,6 +71,12 @@ void expect_within_by_scheme(const test::SampleVolume<T>& volume, const ExtractO
   EXPECT_EQ(is.boundary_edges, was.boundary_edges);
   EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
   EXPECT_EQ(find_self_intersections(mesh, {}).pairs, 0U);
+}
+
+template <class T>
+void expect_within_by_scheme(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
+                             double error_mm) {
+  expect_within_of(volume, extract, error_mm, test::extracted(volume, extract));
 }
 
 template <class T>
@@ -171,6 +178,53 @@ TEST(BoundTest, KeepsAllOfPlateausAndOfTheSmallestVolumeWithinTheError) {
         cell.samples[c] = static_cast<float>(c) * 0.3F;  // 0: the iso-value
     }
     expect_within(cell, {}, 0.2);
+  }
+}
+
+// The mesh without those components whose bit in `left_out` is set.
+Mesh without(const Mesh& whole, std::uint64_t left_out) {
+  Mesh mesh = test::copy_of(whole);
+  Components components;
+  find_components(mesh, {}, components);
+  std::vector<bool> kept;
+  for (std::uint32_t n = 0; n < components.count; ++n)
+    kept.push_back((left_out >> n % 64 & 1) == 0);
+  leave_out(kept, triangles_of(components, mesh), components, mesh);
+  return mesh;
+}
+
+TEST(BoundTest, KeepsAnyComponentsOfNoiseWithinTheError) {
+  std::mt19937_64 random(3);
+  for (unsigned i = 0; i < 24; ++i) {
+    const auto volume = test::noise<std::uint8_t>({0, 0, 0, 1, 2}, {6, 5, 7}, i);
+    const ExtractOptions extract = {
+        .iso = i % 3 == 0 ? 1.5 : 1,
+        .scheme = i % 2 == 0 ? Scheme::kSix : Scheme::kFive,
+        .interpolation = i % 5 == 0 ? Interpolation::kMidpoint : Interpolation::kLinear,
+        .close = i % 4 < 2};
+    SCOPED_TRACE(i);
+    const Mesh whole = test::extracted(volume, extract);
+    const Mesh some = without(whole, random());
+    expect_within_of(volume, extract, 0.2, some);
+    expect_within_of(volume, extract, 0.2, without(some, random()));
+  }
+}
+
+// Walls within walls, each alone: around solid and around hollow parts.
+TEST(BoundTest, KeepsEachOfSeveralNestedShellsWithinTheError) {
+  const auto onion = [](const test::Point& p) {
+    return std::sin(1.9 * std::hypot(p[0] - 5.2, p[1] - 5.1, p[2] - 4.9));
+  };
+  for (const auto& [name, geometry] : test::all_geometries()) {
+    SCOPED_TRACE(name);
+    const auto volume = test::sample<float>(onion, {11, 11, 11}, geometry);
+    const Mesh whole = test::extracted(volume, {});
+    const std::uint64_t count = measure_topology(whole, {}).components;
+    ASSERT_GT(count, 3U);
+    const double step = *std::ranges::min_element(geometry.spacing);
+    for (std::uint64_t n = 0; n < count; ++n) {
+      expect_within_of(volume, {}, 0.2 * step, without(whole, ~(std::uint64_t{1} << n)));
+    }
   }
 }
 
