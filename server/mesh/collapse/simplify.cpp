@@ -108,10 +108,11 @@ class Simplifier {
   // Blocks have not come to as few triangles as was aimed at.
   void conclude() {
     if (!grid_) {
-      simplify_last(options_.triangles, quiet_, mesh_, current_, sides_);
+      simplify_last(options_.triangles, options_.held, quiet_, mesh_, current_, sides_);
       effect_.reached_triangles = is_enough();
     }
-    effect_.is_least = !effect_.reached_triangles && (!grid_ || is_least(mesh_, current_, sides_));
+    effect_.is_least =
+        !effect_.reached_triangles && (!grid_ || is_least(options_.held, mesh_, current_, sides_));
   }
 
   std::uint32_t cube_of(std::size_t triangle, int round) const {
@@ -236,7 +237,8 @@ class Simplifier {
                              ? 0
                              : static_cast<double>(options_.triangles) /
                                    static_cast<double>(std::max<std::size_t>(1, current_.size()));
-    return {mesh_, original_, grid_ ? &*grid_ : nullptr, options_.max_error_mm, share};
+    return {mesh_, original_,    grid_ ? &*grid_ : nullptr, options_.max_error_mm,
+            share, options_.held};
   }
 
   void simplify_blocks(int round, const Blocks& block_from, std::vector<SurfaceBlock>& results) {

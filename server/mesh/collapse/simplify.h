@@ -27,6 +27,8 @@ struct SimplifyOptions {
   std::span<const Vec3> before = {};
   // Target triangle count, spread evenly over the blocks. 0: as few as the error allows.
   std::uint64_t triangles = 0;
+  // A flag for each vertex of the mesh: it stays, on junction curves too. Empty: any may go.
+  std::span<const std::uint8_t> held = {};
 };
 
 struct SimplificationEffect {

@@ -231,6 +231,9 @@ class BlockSimplifier {
     // Vertices that are not manifold at the start are held, and exempt from later checks.
     before_ = look_at_fans(parts_, mesh_.triangles, exempt_, held_);
     exempt_ = held_;
+    for (std::size_t v = 0; v < held_.size(); ++v) {
+      if (goal.holds(mesh_.origin[v])) held_[v] = 1;
+    }
     for (const Triangle& triangle : mesh_.triangles) {
       if (mesh_.has_area(triangle)) continue;
       for (const std::uint32_t vertex : triangle) is_flat_[vertex] = held_[vertex] = 1;

@@ -33,7 +33,10 @@ struct BlockGoal {
   SurfaceView original;
   const TriangleGrid* grid = nullptr;  // of the original; none where nothing is measured
   double max_error_mm = 0;
-  double share = 0;  // of the triangles, that is aimed at
+  double share = 0;                         // of the triangles, that is aimed at
+  std::span<const std::uint8_t> held = {};  // as SimplifyOptions
+
+  bool holds(std::uint32_t vertex) const { return !held.empty() && held[vertex] != 0; }
 };
 
 // A block with vertices of its own, from 0 on.

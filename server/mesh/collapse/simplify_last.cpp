@@ -20,11 +20,12 @@ constexpr std::size_t kMostAround = 256;         // to look at takes the square 
 
 class LastSimplifier : private EdgeCollapses {
  public:
-  LastSimplifier(const Mesh& mesh, const std::vector<Triangle>& current,
-                 const std::vector<WallSides>& sides)
+  LastSimplifier(std::span<const std::uint8_t> held, const Mesh& mesh,
+                 const std::vector<Triangle>& current, const std::vector<WallSides>& sides)
       : EdgeCollapses(mesh, current), sides_(sides), version_(mesh_.origin.size(), 0) {
     for (std::uint32_t v = 0; v < mesh_.origin.size(); ++v) {
-      if (is_free(mesh, v)) free_.push_back(v);
+      const bool is_held = !held.empty() && held[mesh_.origin[v]] != 0;
+      if (!is_held && is_free(mesh, v)) free_.push_back(v);
     }
   }
 
@@ -164,16 +165,17 @@ class LastSimplifier : private EdgeCollapses {
 
 }  // namespace
 
-void simplify_last(std::uint64_t triangles, const Context& context, const Mesh& mesh,
-                   std::vector<Triangle>& current, std::vector<WallSides>& sides) {
-  LastSimplifier last(mesh, current, sides);
+void simplify_last(std::uint64_t triangles, std::span<const std::uint8_t> held,
+                   const Context& context, const Mesh& mesh, std::vector<Triangle>& current,
+                   std::vector<WallSides>& sides) {
+  LastSimplifier last(held, mesh, current, sides);
   last.run(triangles, context);
   last.take(current, sides);
 }
 
-bool is_least(const Mesh& mesh, const std::vector<Triangle>& current,
-              const std::vector<WallSides>& sides) {
-  return !LastSimplifier(mesh, current, sides).can_collapse();
+bool is_least(std::span<const std::uint8_t> held, const Mesh& mesh,
+              const std::vector<Triangle>& current, const std::vector<WallSides>& sides) {
+  return !LastSimplifier(held, mesh, current, sides).can_collapse();
 }
 
 }  // namespace isomesh::mesh

@@ -33,7 +33,8 @@ class LineSimplifier : private EdgeCollapses {
     is_free_.resize(mesh_.origin.size());
     for (std::size_t v = 0; v < is_free_.size(); ++v) {
       const std::uint32_t vertex = mesh_.origin[v];
-      is_free_[v] = is_free[vertex] != 0 && goal.mesh.is_on_line(vertex) && !is_at_end_[v];
+      is_free_[v] = is_free[vertex] != 0 && goal.mesh.is_on_line(vertex) && !is_at_end_[v] &&
+                    !goal.holds(vertex);
     }
   }
 

@@ -111,6 +111,32 @@ TEST(SimplifyWalls, LeaveEachLabelASurfaceWhateverTheNumber) {
   }
 }
 
+// Some on junction curves, and some of the walls between them.
+TEST(SimplifyWalls, KeepHeldVertices) {
+  const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
+  const SeparatingSurface original = smooth_cells(4, options);
+  std::vector<std::uint8_t> held(original.mesh.positions.size());
+  std::vector<Vec3> places;
+  std::size_t on_line = 0;
+  for (std::size_t v = 0; v < held.size(); v += 7) {
+    held[v] = 1;
+    places.push_back(original.mesh.positions[v]);
+    on_line += original.mesh.is_on_line(v) ? 1 : 0;
+  }
+  EXPECT_GT(on_line, 10U);
+  for (const bool is_measured : {false, true}) {
+    SeparatingSurface surface = smooth_cells(4, options);
+    SimplifyOptions simplification = {.held = held};
+    if (is_measured) simplification.max_error_mm = 0.3;
+    if (!is_measured) simplification.triangles = 4;
+    EXPECT_EQ(simplify(simplification, {}, surface).is_least, !is_measured);
+    std::vector<Vec3> left(surface.mesh.positions.begin(), surface.mesh.positions.end());
+    std::ranges::sort(left);
+    for (const Vec3& place : places) EXPECT_TRUE(std::ranges::binary_search(left, place));
+    EXPECT_LT(left.size(), 3 * original.mesh.positions.size() / 5);
+  }
+}
+
 TEST(SimplifyWalls, AreTheSameOnAnyNumberOfThreads) {
   const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
   const auto make = [&] {
