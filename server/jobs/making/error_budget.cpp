@@ -72,12 +72,6 @@ double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
   return quantisation_of(grid);
 }
 
-const char* why_measured(const MeshParameters& parameters) {
-  if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
-  if (scheme_of(parameters.scheme) == Scheme::kBcc) return "The proof is for schemes 5 and 6.";
-  return nullptr;
-}
-
 std::vector<MeshFormat> measured_formats(const MeshParameters& parameters) {
   std::vector<MeshFormat> formats = files_of(parameters);
   if (std::erase(formats, MeshFormat::kZip) > 0) {

@@ -25,10 +25,6 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
                        double moved_mm = 0);
 
-// The reason if the error is measured and not proven; null if a proof is tried, which covers the
-// whole surface that the samples define.
-const char* why_measured(const MeshParameters& parameters);
-
 // A certificate measures no more points of each surface if the limit is proven: what is found is
 // then only told beside it.
 inline constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 20;

@@ -49,31 +49,23 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
 }
 
-// False if nothing can be proven; then the mesh is unchanged, and the certificate says why.
+// False if the field proves nothing; then the mesh is unchanged.
 bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
                            const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
-  MeshCertificate& certificate = summary.certificate.emplace();
-  if (const char* why = why_measured(parameters)) {
-    certificate.why_unproven = why;
-    return false;
-  }
   const double most = *parameters.max_error_mm;
   const mesh::BoundOptions options = {.max_error_mm = most,
                                       .rounding_mm = quantisation_mm(parameters, mesh, most),
                                       .triangles = parameters.triangles.value_or(0),
                                       .is_smoothed = parameters.passes > 0};
-  std::string why_not;
+  std::string why_not;  // the distance is checked otherwise then
   const auto bound = with_sample(samples.type, [&](auto sample) {
     return mesh::simplify_within(lattice_of<decltype(sample)>(samples),
                                  extract_options(parameters, request.iso), options,
                                  progress.context(), mesh, why_not);
   });
-  if (!bound) {
-    certificate.why_unproven = why_not;
-    return false;
-  }
-  certificate.bound_mm = bound->bound_mm + quantisation_mm(parameters, mesh);
+  if (!bound) return false;
+  summary.certificate.emplace().bound_mm = bound->bound_mm + quantisation_mm(parameters, mesh);
   const bool is_by_triangles =
       parameters.triangles && mesh.triangles.size() <= *parameters.triangles;
   summary.simplified = {bound->triangles_before, is_by_triangles ? Simplification::Bound::kTriangles
@@ -81,9 +73,9 @@ bool simplify_within_error(const SampleArray& samples, const MeshRequest& reques
   return true;
 }
 
-void simplify_measured(const MeshParameters& parameters, const ExtractedSurface& extracted,
-                       const Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
-                       MeshSummary& summary) {
+void simplify_checked(const MeshParameters& parameters, const ExtractedSurface& extracted,
+                      const Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
+                      MeshSummary& summary) {
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
     options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);
@@ -94,6 +86,13 @@ void simplify_measured(const MeshParameters& parameters, const ExtractedSurface&
       walls != nullptr ? mesh::simplify(options, progress.context(), *walls)
                        : mesh::simplify(options, progress.context(), mesh);
   summary.simplified = {effect.triangles_before, bound_of(parameters, effect)};
+  if (!parameters.max_error_mm) return;
+  MeshCertificate& certificate = summary.certificate.emplace();
+  if (effect.is_within) {
+    certificate.bound_mm = parameters.max_error_mm;
+  } else {
+    certificate.why_unproven = "Some points are farther than the limit after all attempts.";
+  }
 }
 
 void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
@@ -161,9 +160,9 @@ void simplify_stage(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
   progress.enter(Stage::kSimplify);
-  const bool is_proven =
-      parameters.max_error_mm && simplify_within_error(samples, request, progress, mesh, summary);
-  if (!is_proven) simplify_measured(parameters, extracted, progress, mesh, walls, summary);
+  const bool is_done = parameters.max_error_mm && walls == nullptr &&
+                       simplify_within_error(samples, request, progress, mesh, summary);
+  if (!is_done) simplify_checked(parameters, extracted, progress, mesh, walls, summary);
   if (parameters.normals && walls == nullptr) {
     with_sample(samples.type, [&](auto sample) {
       set_gradient_normals(lattice_of<decltype(sample)>(samples), progress.quiet(), mesh);

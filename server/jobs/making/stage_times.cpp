@@ -56,10 +56,9 @@ double uneven_factor(const VolumeSize& volume) {
 
 double certify_ms(const SurfaceSize& surface, const SurfaceSize& written, const VolumeSize& volume,
                   const MeshParameters& parameters) {
-  const bool is_proven = parameters.max_error_mm && why_measured(parameters) == nullptr;
   const auto points = [&](const SurfaceSize& size) {
     const double all = as_double(size.vertices + size.triangles);
-    return is_proven ? std::min(all, as_double(kMostPointsBesideAProof)) : all;
+    return parameters.max_error_mm ? std::min(all, as_double(kMostPointsBesideAProof)) : all;
   };
   const auto measured = static_cast<double>(measured_formats(parameters).size());
   return measured * uneven_factor(volume) *

@@ -1,13 +1,12 @@
-#include "server/mesh/collapse/simplify.h"
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <numeric>
 #include <optional>
-#include <string>
+#include <utility>
 #include <vector>
 
+#include "server/mesh/collapse/proposal.h"
 #include "server/mesh/collapse/simplify_block.h"
 #include "server/mesh/collapse/simplify_cubes.h"
 #include "server/mesh/collapse/simplify_last.h"
@@ -395,35 +394,13 @@ class Simplifier {
   SimplificationEffect effect_;
 };
 
-SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh,
-                              SeparatingSurface* walls) {
-  const std::uint64_t points = std::uint64_t{mesh.positions.size()} + mesh.triangles.size();
-  if (points >= TriangleGrid::kNone) {
-    throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(points) +
-                                          " vertices and triangles; more than 32 bits can number");
-  }
-  context.throw_if_stopped();
-  if (mesh.triangles.size() == 0) return {};
-  Simplifier simplifier(options, context, mesh, walls);
-  const SimplificationEffect effect = simplifier.run();
-  context.throw_if_stopped();
-  replace_triangles(simplifier.triangles(), simplifier.sides(), mesh);
-  if (walls != nullptr) {
-    walls->sides.shrink(mesh.triangles.size());
-    std::ranges::copy(simplifier.sides(), walls->sides.begin());
-  }
-  return effect;
-}
-
 }  // namespace
 
-SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh) {
-  return simplify(options, context, mesh, nullptr);
-}
-
-SimplificationEffect simplify(const SimplifyOptions& options, const Context& context,
-                              SeparatingSurface& walls) {
-  return simplify(options, context, walls.mesh, &walls);
+Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
+                 const SeparatingSurface* walls) {
+  Simplifier simplifier(options, context, mesh, walls);
+  const SimplificationEffect effect = simplifier.run();
+  return {effect, std::move(simplifier.triangles()), std::move(simplifier.sides())};
 }
 
 }  // namespace isomesh::mesh

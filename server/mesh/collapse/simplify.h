@@ -43,6 +43,8 @@ struct SimplificationEffect {
   bool reached_triangles = true;
   // True if the target was not reached because no further edge can collapse, whatever the error.
   bool is_least = false;
+  // True if the error holds for every point of both surfaces, wall by wall; false without one, too.
+  bool is_within = false;
 };
 
 // Simplifies the mesh in place. The remaining vertices keep their order and positions. All boundary

@@ -89,7 +89,8 @@ std::vector<IntersectingPair> pairs_in(const TriangleGrid& grid, std::size_t par
 
 }  // namespace
 
-SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context) {
+SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context,
+                                          std::size_t most_places) {
   const TriangleGrid grid(surface, context);
   std::vector<std::vector<IntersectingPair>> parts(grid.parts());
   parallel_for(context, parts.size(),
@@ -106,7 +107,7 @@ SelfIntersections find_self_intersections(const SurfaceView& surface, const Cont
 
   SelfIntersections result;
   result.pairs = pairs.size();
-  const auto told = std::span(pairs).first(std::min(pairs.size(), SelfIntersections::kMostPlaces));
+  const auto told = std::span(pairs).first(std::min(pairs.size(), most_places));
   result.places.assign(told.begin(), told.end());
   std::vector<std::uint32_t> named;
   for (const IntersectingPair& pair : pairs) named.insert(named.end(), {pair.first, pair.second});

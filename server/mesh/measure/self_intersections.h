@@ -1,6 +1,7 @@
 // Self-intersections of a surface. Printers cannot print such places.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -24,7 +25,7 @@ struct SelfIntersections {
 
   std::uint64_t pairs = 0;
   std::uint64_t triangles = 0;           // those that intersect another one
-  std::vector<IntersectingPair> places;  // the first pairs, by their numbers
+  std::vector<IntersectingPair> places;  // the first pairs, by their numbers: `most_places`
 };
 
 // Decides with exact predicates on the stored positions. Two triangles intersect if they have a
@@ -38,6 +39,7 @@ struct SelfIntersections {
 // Does not depend on the number of threads. Takes the memory of TriangleGrid, and 32 bytes a pair.
 // Throws Error kUnusableVolume for a position that is not finite, kTooLarge as TriangleGrid, and
 // kCancelled.
-SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context);
+SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context,
+                                          std::size_t most_places = SelfIntersections::kMostPlaces);
 
 }  // namespace isomesh::mesh

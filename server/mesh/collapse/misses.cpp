@@ -1,0 +1,154 @@
+#include "server/mesh/collapse/misses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numeric>
+#include <optional>
+
+#include "server/mesh/parallel.h"
+
+namespace isomesh::mesh {
+namespace {
+
+constexpr double kSmallest = 1e-3;  // of the distance: the radius of a piece that is not cut
+constexpr double kRounding = 1e-9;  // more than what double precision loses, as a share
+
+std::uint32_t key_of(const WallSides& sides) {
+  return std::uint32_t{sides.front} << 16 | sides.back;
+}
+
+Point middle_of(const Point& a, const Point& b) {
+  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+}
+
+Point centre_of(const Corners& piece) {
+  const auto& [a, b, c] = piece;
+  return {(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3, (a[2] + b[2] + c[2]) / 3};
+}
+
+double radius_around(const Point& centre, const Corners& piece) {
+  double most = 0;
+  for (const Point& corner : piece) {
+    const Point way = minus(corner, centre);
+    most = std::max(most, dot(way, way));
+  }
+  return std::sqrt(most);
+}
+
+// Looks at one triangle after the other. Not thread safe.
+class Searcher {
+ public:
+  Searcher(const WallGrids& from, const WallGrids& to, double within_mm)
+      : from_(from),
+        to_(to),
+        within_(within_mm * (1 - kRounding)),
+        squared_within_(within_ * within_),
+        guesses_(to.walls(), TriangleGrid::kNone) {}
+
+  std::optional<Miss> look_at(std::uint32_t triangle) {
+    const Corners corners = corners_of(from_.surface(), triangle);
+    const std::size_t wall = to_.find(from_.sides(from_.wall_of(triangle)));
+    if (wall == WallGrids::kNone) return Miss{triangle, centre_of(corners)};
+    grid_ = &to_.grid(wall);
+    guess_ = guesses_[wall];
+    farthest_ = 0;
+    const bool is_all_near = is_near(corners);
+    guesses_[wall] = guess_;
+    if (is_all_near) return {};
+    return Miss{triangle, place_};
+  }
+
+ private:
+  // Pieces that are too far may be many; the first tells enough.
+  bool is_near(const Corners& piece) {
+    if (guess_ != TriangleGrid::kNone && is_near_guess(piece)) return true;
+    const Point centre = centre_of(piece);
+    const TriangleGrid::Nearest nearest = grid_->nearest(centre, guess_);
+    guess_ = nearest.triangle;
+    const double distance = std::sqrt(nearest.squared_mm);
+    const double radius = radius_around(centre, piece);
+    if (distance + radius <= within_ || is_near_guess(piece)) return true;
+    if (distance > farthest_) {
+      farthest_ = distance;
+      place_ = centre;
+    }
+    if (!(distance <= within_) || radius < kSmallest * within_) return false;
+    const auto& [a, b, c] = piece;
+    const Point ab = middle_of(a, b);
+    const Point bc = middle_of(b, c);
+    const Point ca = middle_of(c, a);
+    return is_near({ab, bc, ca}) && is_near({a, ab, ca}) && is_near({ab, b, bc}) &&
+           is_near({ca, bc, c});
+  }
+
+  bool is_near_guess(const Corners& piece) const {
+    const Corners other = corners_of(grid_->surface(), guess_);
+    return std::ranges::all_of(piece, [&](const Point& corner) {
+      return squared_distance(corner, other) <= squared_within_;
+    });
+  }
+
+  const WallGrids& from_;
+  const WallGrids& to_;
+  const double within_;
+  const double squared_within_;
+  std::vector<std::uint32_t> guesses_;  // by wall: what was near last
+  const TriangleGrid* grid_ = nullptr;
+  std::uint32_t guess_ = TriangleGrid::kNone;
+  double farthest_ = 0;
+  Point place_ = {0, 0, 0};
+};
+
+}  // namespace
+
+WallGrids::WallGrids(const SurfaceView& surface, std::span<const WallSides> sides,
+                     const Context& context)
+    : surface_(surface), wall_of_(surface.triangles.size(), 0), members_(surface.triangles.size()) {
+  std::iota(members_.begin(), members_.end(), 0U);
+  const auto key = [&](std::uint32_t t) { return sides.empty() ? 0 : key_of(sides[t]); };
+  if (!sides.empty()) std::ranges::stable_sort(members_, {}, key);
+  triangles_.reserve(members_.size());
+  for (std::size_t n = 0; n < members_.size(); ++n) {
+    const std::uint32_t t = members_[n];
+    if (n == 0 || key(t) != key(members_[n - 1])) {
+      begins_.push_back(n);
+      sides_.push_back(sides.empty() ? WallSides{} : sides[t]);
+    }
+    wall_of_[t] = static_cast<std::uint32_t>(sides_.size() - 1);
+    triangles_.push_back(surface.triangles[t]);
+  }
+  begins_.push_back(members_.size());
+  for (std::size_t wall = 0; wall < sides_.size(); ++wall) {
+    const auto its =
+        std::span(triangles_).subspan(begins_[wall], begins_[wall + 1] - begins_[wall]);
+    grids_.emplace_back(SurfaceView(surface.positions, its), context);
+  }
+}
+
+std::size_t WallGrids::find(const WallSides& sides) const {
+  const auto found = std::ranges::lower_bound(sides_, key_of(sides), {}, key_of);
+  if (found == sides_.end() || *found != sides) return kNone;
+  return static_cast<std::size_t>(found - sides_.begin());
+}
+
+std::vector<Miss> find_misses(const WallGrids& from, const WallGrids& to, double within_mm,
+                              const Context& context) {
+  constexpr std::size_t kPerTask = 2048;
+  const std::size_t count = from.surface().triangles.size();
+  std::vector<std::vector<Miss>> found(chunks_of(count, kPerTask));
+  const auto look = [&](std::size_t begin, std::size_t end) {
+    Searcher searcher(from, to, within_mm);
+    for (std::size_t t = begin; t < end; ++t) {
+      if (const auto miss = searcher.look_at(static_cast<std::uint32_t>(t))) {
+        found[begin / kPerTask].push_back(*miss);
+      }
+    }
+  };
+  for_chunks(context, count, look, kPerTask);
+  std::vector<Miss> misses;
+  for (const auto& part : found) misses.insert(misses.end(), part.begin(), part.end());
+  return misses;
+}
+
+}  // namespace isomesh::mesh

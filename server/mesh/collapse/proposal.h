@@ -1,0 +1,25 @@
+// One attempt to simplify a surface; private to this folder.
+#pragma once
+
+#include <vector>
+
+#include "server/mesh/collapse/simplify.h"
+#include "server/mesh/context.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+// What a surface becomes: triangles between its vertices, and their sides if it has walls.
+struct Proposal {
+  SimplificationEffect effect;
+  std::vector<Triangle> triangles;
+  std::vector<WallSides> sides;
+};
+
+// The error is measured at vertices and centres of triangles only. `walls` are whose mesh it is, if
+// any. The same for any number of threads. Throws as simplify.
+Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
+                 const SeparatingSurface* walls);
+
+}  // namespace isomesh::mesh
