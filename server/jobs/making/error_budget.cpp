@@ -74,7 +74,6 @@ double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
 
 const char* why_measured(const MeshParameters& parameters) {
   if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
-  if (scheme_of(parameters.scheme) == Scheme::kBcc) return "The proof is for schemes 5 and 6.";
   if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
   if (!parameters.components.keeps_all()) return "The proof is for all components together.";
   return nullptr;
