@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "proto/types.h"
@@ -12,6 +13,8 @@
 #include "tests/support/shapes.h"
 
 namespace isomesh::test {
+
+inline constexpr std::array kSchemes = {Scheme::kSix, Scheme::kFive, Scheme::kBcc};
 
 // Counts and extracts into `mesh`, reusing its memory.
 template <class T>

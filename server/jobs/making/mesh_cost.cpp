@@ -37,7 +37,9 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
     simplifying = surface.triangles * kSimplifyBytesPerTriangle;
   }
   if (parameters.max_error_mm && !parameters.labels) {
-    simplifying = surface.triangles * kProveBytesPerTriangle + samples * sizeof(float);
+    const std::uint64_t points =
+        scheme_of(parameters.scheme) == Scheme::kBcc ? 2 * samples : samples;
+    simplifying = surface.triangles * kProveBytesPerTriangle + points * sizeof(float);
   }
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
   // While files are encoded.

@@ -158,9 +158,7 @@ double BoundedMesh::bound_at(std::span<const Vec3> places) const {
   return most + shift_mm;
 }
 
-bool has_bound(const ExtractOptions& options) {
-  return options.scheme != Scheme::kBcc && !options.regularize;
-}
+bool has_bound(const ExtractOptions& options) { return !options.regularize; }
 
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,

@@ -45,8 +45,7 @@ struct BoundedMesh {
   double bound_at(std::span<const Vec3> places) const;
 };
 
-// True if simplify_within can prove a bound for such a surface: one of five or six tetrahedra a
-// cell that is not regularised.
+// True if simplify_within can prove a bound for such a surface: one that is not regularised.
 bool has_bound(const ExtractOptions& options);
 
 // Simplifies `mesh` in place, which extract_surface made of the lattice with these options, and
@@ -58,8 +57,8 @@ bool has_bound(const ExtractOptions& options);
 //
 // Nothing where that cannot be proven, because single precision does not tell the samples apart or
 // parts of the surface are missing; then the mesh is as it was, and `why_not` says why in a
-// sentence for users. Takes some 250 bytes a triangle and 4 bytes a sample beside the mesh. Throws
-// Error kCancelled.
+// sentence for users. Beside the mesh it takes some 250 bytes a triangle and 4 bytes a sample, or 8
+// on the body-centred lattice. Throws Error kCancelled.
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
                                            const BoundOptions& options, const Context& context,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace isomesh::mesh::collapse {
@@ -11,6 +12,10 @@ namespace {
 double floor_of(double x) {
   const auto whole = static_cast<double>(static_cast<std::int32_t>(x));
   return whole > x ? whole - 1 : whole;
+}
+
+SampleSteps steps_of(const Field& field) {
+  return {1, field.step_y(), field.step_z(), static_cast<std::ptrdiff_t>(field.first_centre)};
 }
 
 // F at a place that is counted from the sample at `base`.
@@ -69,9 +74,44 @@ double FivePlanes::value(const float* corner, const SampleSteps& steps, bool is_
   return -0.5 * (at(0, 0, 0) * all + at(1, 1, 0) * z + at(1, 0, 1) * y + at(0, 1, 1) * x);
 }
 
+// A place in a cell is in the pyramid from its centre to one of its faces. Around the face are four
+// tetrahedra between this centre and the one beyond. At the border there is none beyond: a value
+// for it that makes the mean of both that of the diagonal's ends leaves two tetrahedra.
+double BccPlanes::value(const float* corner, const SampleSteps& steps, bool is_odd, Vecd in_cell) {
+  const float* const centre = corner + steps.centre;
+  if (*centre == kNoCentre) return SixPlanes::value(corner, steps, is_odd, in_cell);
+  double normal = in_cell.x - 0.5;  // from the centre
+  double u = in_cell.y - 0.5;
+  double v = in_cell.z - 0.5;
+  std::ptrdiff_t to_face = steps.x;
+  std::ptrdiff_t to_u = steps.y;
+  std::ptrdiff_t to_v = steps.z;
+  const auto turn_to = [&](double& other, std::ptrdiff_t& to_other) {
+    if (std::abs(other) <= std::abs(normal)) return;
+    std::swap(other, normal);
+    std::swap(to_other, to_face);
+  };
+  turn_to(u, to_u);
+  turn_to(v, to_v);
+  const float* const face = normal > 0 ? corner + to_face : corner;
+  const auto at = [](const float* point) { return double{*point}; };
+  const float other = normal > 0 ? centre[to_face] : centre[-to_face];
+  const double beyond =
+      other == kNoCentre ? at(face) + at(face + to_u + to_v) - at(centre) : double{other};
+  // The tetrahedron's side of the square, and how far the place is along it from its middle.
+  const bool is_along_v = std::abs(u) >= std::abs(v);
+  const double to_side = is_along_v ? u : v;
+  const double along = is_along_v ? v : u;
+  const std::ptrdiff_t step = is_along_v ? to_v : to_u;
+  const float* const side = to_side > 0 ? face + (is_along_v ? to_u : to_v) : face;
+  const double out = std::abs(to_side);
+  const double to_centre = 0.5 - std::abs(normal);
+  return at(centre) * (0.5 - out + to_centre) + beyond * (0.5 - out - to_centre) +
+         at(side) * (out - along) + at(side + step) * (out + along);
+}
+
 template <class Planes>
-Clear<Planes>::Clear(const Field& field)
-    : field_(field), steps_{1, field.step_y(), field.step_z()} {
+Clear<Planes>::Clear(const Field& field) : field_(field), steps_(steps_of(field)) {
   for (std::size_t d = 0; d < lines_.size(); ++d) {
     const LineDirection& line = Planes::kLines[d];
     lines_[d] = {steps_.to(line.per_first), steps_.to(line.per_second), steps_.to(line.per_along)};
@@ -168,6 +208,22 @@ bool Clear<Planes>::line(const PlaneNumbers& a, const PlaneNumbers& b, const Pla
   const double turn = area > 0 ? 1 : -1;
   if (std::min(turn * of_a, std::min(turn * of_b, turn * of_c)) < 0) return true;
   const double along = (of_a * a.of[w] + of_b * b.of[w] + of_c * c.of[w]) / area;
+  if constexpr (std::is_same_v<Planes, BccPlanes>) {
+    const auto half_steps = [](const std::array<std::int8_t, 3>& steps) {
+      return Vecd{steps[0] * 0.5, steps[1] * 0.5, steps[2] * 0.5};
+    };
+    Vecd place = half_steps(families.per_first) * i + half_steps(families.per_second) * j +
+                 half_steps(families.per_along) * along;
+    // Rounding leads out of the volume nowhere.
+    const auto keep_within = [&](double& coordinate, std::size_t k) {
+      const auto [least, most] = std::minmax({a.of[k], b.of[k], c.of[k]});
+      coordinate = std::clamp<double>(coordinate, least, most);
+    };
+    keep_within(place.x, 0);
+    keep_within(place.y, 1);
+    keep_within(place.z, 2);
+    return is_positive(sign * value(place));
+  }
   const double whole = floor_of(along);
   const auto& [first, second, step] = lines_[direction];
   const float* const p =
@@ -180,12 +236,20 @@ bool Clear<Planes>::line(const PlaneNumbers& a, const PlaneNumbers& b, const Pla
 
 template class Clear<SixPlanes>;
 template class Clear<FivePlanes>;
+template class Clear<BccPlanes>;
 
 double value_at(const Field& field, Vecf place) {
-  const SampleSteps steps = {1, field.step_y(), field.step_z()};
+  const SampleSteps steps = steps_of(field);
   const float* const base = field.values.data();
-  return field.scheme == Scheme::kSix ? value_from<SixPlanes>(base, steps, wide(place))
-                                      : value_from<FivePlanes>(base, steps, wide(place));
+  switch (field.scheme) {
+    case Scheme::kSix:
+      return value_from<SixPlanes>(base, steps, wide(place));
+    case Scheme::kFive:
+      return value_from<FivePlanes>(base, steps, wide(place));
+    case Scheme::kBcc:
+      return value_from<BccPlanes>(base, steps, wide(place));
+  }
+  return 0;
 }
 
 }  // namespace isomesh::mesh::collapse

@@ -6,7 +6,7 @@
 //   1. the triangle's own corners: point(),
 //   2. the places where one of its edges crosses a plane: edge(),
 //   3. the places where a line in which planes meet crosses it: inside().
-// On such a line F is linear between one sample and the next.
+// On such a line F is linear between one sample, or centre, and the next.
 //
 // Places lie on a grid of 2^-16 voxels (tube.h) and are counted from a sample nearby. So the
 // numbers of planes are exact in single precision. Two such numbers tell how a line passes the
@@ -27,6 +27,8 @@ namespace isomesh::mesh::collapse {
 template <class Planes>
 class Clear {
  public:
+  using PlaneNumbers = typename Planes::Numbers;
+
   explicit Clear(const Field& field);
 
   // Sets the origin of at() to a sample before `a`, which must be within the volume. Returns that
@@ -70,5 +72,6 @@ class Clear {
 
 extern template class Clear<SixPlanes>;
 extern template class Clear<FivePlanes>;
+extern template class Clear<BccPlanes>;
 
 }  // namespace isomesh::mesh::collapse

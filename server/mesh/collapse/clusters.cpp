@@ -17,7 +17,6 @@ class PlaneClusters {
  public:
   PlaneClusters(const Field& field, const Crossings& crossings, std::uint32_t z)
       : field_(field),
-        links_(links_of(field.scheme)),
         below_(field, crossings, z == 0 ? 0 : z - 1),
         own_(field, crossings, z),
         begin_(std::size_t{z} * field.dims.x * field.dims.y) {}
@@ -25,11 +24,15 @@ class PlaneClusters {
   // `before`: how many samples of a row, and rows, are before those of the layer.
   Clusters find(const ClusterLayer& layer, std::uint32_t before) const {
     Clusters clusters;
-    for (std::uint32_t y = 0; y + 1 < layer.row_begin.size(); ++y) {
-      const std::size_t row = begin_ + (y + before) * field_.dims.x + before;
-      for (const JoiningWord& word : layer.row(y)) {
+    const bool is_bcc = field_.scheme == Scheme::kBcc;
+    const std::uint32_t kinds = is_bcc ? 2 : 1;
+    for (std::uint32_t r = 0; r + 1 < layer.row_begin.size(); ++r) {
+      const auto kind = static_cast<BccPoint>(r % kinds);
+      const Links& links = is_bcc ? links_of(kind) : links_of(field_.scheme);
+      const std::size_t row = begin_ + (r / kinds + before) * field_.dims.x + before;
+      for (const JoiningWord& word : layer.row(r)) {
         visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
-          add(joined.directions(), row + std::size_t{word.word} * 64 + bit, clusters);
+          add(links, joined.directions(), row + std::size_t{word.word} * 64 + bit, clusters);
         });
       }
     }
@@ -37,17 +40,17 @@ class PlaneClusters {
   }
 
  private:
-  void add(Directions left, std::size_t number, Clusters& clusters) const {
+  void add(const Links& links, Directions left, std::size_t number, Clusters& clusters) const {
     const std::size_t x = number % field_.dims.x;
     const std::size_t y = number / field_.dims.x % field_.dims.y;
     const auto parity =
         static_cast<unsigned>((x + y + begin_ / (std::size_t{field_.dims.x} * field_.dims.y)) & 1);
     while (left != 0) {
-      const Directions component = links_.facts(parity, left).first();
+      const Directions component = links.facts(parity, left).first();
       left &= ~component;
-      if (!is_crossed(number, links_.directions()[first_of(component)])) continue;  // left out
+      if (!is_crossed(number, links.directions()[first_of(component)])) continue;  // left out
       for (Directions rest = component; rest != 0; rest &= rest - 1) {
-        clusters.crossings.push_back(crossing(number, links_.directions()[first_of(rest)]));
+        clusters.crossings.push_back(crossing(number, links.directions()[first_of(rest)]));
       }
       std::sort(clusters.crossings.begin() + clusters.begin.back(), clusters.crossings.end());
       clusters.begin.push_back(static_cast<std::uint32_t>(clusters.crossings.size()));
@@ -71,7 +74,6 @@ class PlaneClusters {
   }
 
   const Field& field_;
-  const Links& links_;
   const PlaneCrossings below_;
   const PlaneCrossings own_;
   const std::size_t begin_;

@@ -256,6 +256,10 @@ void collapse_five(const CollapseSurroundings& around, std::size_t least, Block&
   Collapser<SlowClear<FivePlanes>>(around, block).run(least);
 }
 
+void collapse_bcc(const CollapseSurroundings& around, std::size_t least, Block& block) {
+  Collapser<SlowClear<BccPlanes>>(around, block).run(least);
+}
+
 }  // namespace isomesh::mesh::collapse::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -264,12 +268,16 @@ namespace isomesh::mesh::collapse {
 
 HWY_EXPORT(collapse_six);
 HWY_EXPORT(collapse_five);
+HWY_EXPORT(collapse_bcc);
 
 void collapse_block(const CollapseSurroundings& around, std::size_t least, Block& block) {
-  if (around.field.scheme == Scheme::kSix) {
-    HWY_DYNAMIC_DISPATCH(collapse_six)(around, least, block);
-  } else {
-    HWY_DYNAMIC_DISPATCH(collapse_five)(around, least, block);
+  switch (around.field.scheme) {
+    case Scheme::kSix:
+      return HWY_DYNAMIC_DISPATCH(collapse_six)(around, least, block);
+    case Scheme::kFive:
+      return HWY_DYNAMIC_DISPATCH(collapse_five)(around, least, block);
+    case Scheme::kBcc:
+      return HWY_DYNAMIC_DISPATCH(collapse_bcc)(around, least, block);
   }
 }
 

@@ -36,11 +36,11 @@ HWY_INLINE Lanes copies_of(const Vertex& vertex) {
 template <class Planes>
 class SlowClear : public Clear<Planes> {
  public:
-  using Point = PlaneNumbers;
+  using Point = typename Planes::Numbers;
   using Clear<Planes>::Clear;
 
   void base(Vecf a, float /*most*/) { Clear<Planes>::base(a); }
-  PlaneNumbers at(const Lanes& copies, Side side) const {
+  Point at(const Lanes& copies, Side side) const {
     const std::size_t x = side == Side::kIn ? 0 : 4;
     return Clear<Planes>::at({copies[x], copies[x + 1], copies[x + 2]});
   }
@@ -190,8 +190,8 @@ class FastClear {
   static constexpr float kAreaError = 0x1p-21F;
   static constexpr std::ptrdiff_t kLargestLayer = 1 << 24;  // steps of 32 bits lead 64 layers away
 
-  static PlaneNumbers numbers(const Lanes& a) {
-    PlaneNumbers result;
+  static SixPlanes::Numbers numbers(const Lanes& a) {
+    SixPlanes::Numbers result;
     std::memcpy(result.of.data(), &a, sizeof a);
     return result;
   }

@@ -89,6 +89,11 @@ void find_faults_of_five(const TubeStart& start, std::span<const std::uint32_t> 
   find_with<SlowClear<FivePlanes>>(start, triangles, faults);
 }
 
+void find_faults_of_bcc(const TubeStart& start, std::span<const std::uint32_t> triangles,
+                        std::vector<std::uint32_t>& faults) {
+  find_with<SlowClear<BccPlanes>>(start, triangles, faults);
+}
+
 }  // namespace isomesh::mesh::collapse::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -97,13 +102,17 @@ namespace isomesh::mesh::collapse {
 
 HWY_EXPORT(find_faults_of_six);
 HWY_EXPORT(find_faults_of_five);
+HWY_EXPORT(find_faults_of_bcc);
 
 void find_faults(const TubeStart& start, std::span<const std::uint32_t> triangles,
                  std::vector<std::uint32_t>& faults) {
-  if (start.surface.field.scheme == Scheme::kSix) {
-    HWY_DYNAMIC_DISPATCH(find_faults_of_six)(start, triangles, faults);
-  } else {
-    HWY_DYNAMIC_DISPATCH(find_faults_of_five)(start, triangles, faults);
+  switch (start.surface.field.scheme) {
+    case Scheme::kSix:
+      return HWY_DYNAMIC_DISPATCH(find_faults_of_six)(start, triangles, faults);
+    case Scheme::kFive:
+      return HWY_DYNAMIC_DISPATCH(find_faults_of_five)(start, triangles, faults);
+    case Scheme::kBcc:
+      return HWY_DYNAMIC_DISPATCH(find_faults_of_bcc)(start, triangles, faults);
   }
 }
 

@@ -8,7 +8,9 @@
 #include <numeric>
 
 #include "proto/samples.h"
+#include "server/mesh/lattice/bcc_faces.h"
 #include "server/mesh/lattice/border.h"
+#include "server/mesh/lattice/cell_mean.h"
 #include "server/mesh/lattice/placement.h"
 #include "server/mesh/lattice/tetrahedra.h"
 #include "server/mesh/parallel.h"
@@ -18,6 +20,7 @@ namespace {
 
 constexpr double kLargest = 256;
 constexpr float kLeast = 1e-6F;
+constexpr double kMostNearest = 0.25;  // as of SampleRows
 
 template <class T>
 double largest_difference(const Lattice<T>& lattice, double iso) {
@@ -27,11 +30,71 @@ double largest_difference(const Lattice<T>& lattice, double iso) {
                   std::abs(static_cast<double>(*high) - iso));
 }
 
-// Calls visit(sample, its crossed edges as bits by their direction 1..7, the split of its cell) for
-// those of a layer that own any. A sample's edges lie in the cell whose corner 0 it is.
+// The points at the ends of a sample's edges, by direction or slot, as offsets from the sample.
+using EdgeOffsets = std::array<std::array<std::ptrdiff_t, 2>, kBccSlots>;
+
+// Of a sample of odd i+j+k or not. Its edges lie in the cell whose corner 0 it is.
+EdgeOffsets edges_of(const Field& field, bool is_odd) {
+  EdgeOffsets edges = {};
+  const CellSplit& split = cell_split(field.scheme, is_odd);
+  for (unsigned d = 1; d < 8; ++d) {
+    edges[d] = {sample_offset(field.dims, split.ends[d].from),
+                sample_offset(field.dims, split.ends[d].to)};
+  }
+  return edges;
+}
+
+// Of a sample whose cell has a centre, or has none.
+EdgeOffsets bcc_edges_of(const Field& field, bool has_centre) {
+  EdgeOffsets edges = {};
+  for (const unsigned direction : {1U, 2U, 4U, 3U, 5U, 6U, 7U}) {
+    edges[bcc_slot_of(direction)] = {0, sample_offset(field.dims, direction)};
+  }
+  const std::ptrdiff_t centre = field.first_centre;
+  for (unsigned c = 0; c < 8 && has_centre; ++c) edges[c] = {centre, sample_offset(field.dims, c)};
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    edges[kBccCentreSlot + axis] = {centre, centre + sample_offset(field.dims, 1U << axis)};
+  }
+  return edges;
+}
+
+// The crossed slots of a sample. `inside`: the corners of its cell; `steps`: a bit for each axis
+// along which there is a next sample.
+unsigned crossed_slots(const Field& field, std::size_t sample, unsigned inside, unsigned steps) {
+  const float* const centre = &field.values[field.first_centre + sample];
+  const bool is_inside = *centre > 0;
+  const auto is_crossed = [&](unsigned direction) {
+    return (steps & direction) == direction && ((inside ^ inside >> direction) & 1) != 0;
+  };
+  unsigned set = 0;
+  if (*centre != kNoCentre) {
+    set = inside ^ (is_inside ? 0xFFU : 0U);
+  } else if (is_crossed(7)) {
+    set = 1;
+  }
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const auto mark = [&](unsigned first_slot, bool is_set) {
+      if (is_set) set |= 1U << (first_slot + axis);
+    };
+    const std::ptrdiff_t step = sample_offset(field.dims, 1U << axis);
+    const bool is_between = *centre != kNoCentre && centre[-step] != kNoCentre;
+    mark(kBccAxisSlot, is_crossed(1U << axis));
+    mark(kBccCentreSlot,
+         *centre != kNoCentre && centre[step] != kNoCentre && (centre[step] > 0) != is_inside);
+    mark(kBccDiagonalSlot, !is_between && is_crossed(7U ^ 1U << axis));
+  }
+  return set;
+}
+
+// Calls visit(sample, its crossed edges as bits by direction or slot, all its edges) for those of a
+// layer that own any.
 template <class Visit>
 void visit_crossed(const Field& field, std::uint32_t z, Visit visit) {
   const Dims& dims = field.dims;
+  const bool is_bcc = field.scheme == Scheme::kBcc;
+  const std::array edges = {is_bcc ? bcc_edges_of(field, false) : edges_of(field, false),
+                            is_bcc ? bcc_edges_of(field, true) : edges_of(field, true)};
+  const std::array splits = {&cell_split(field.scheme, false), &cell_split(field.scheme, true)};
   std::size_t sample = std::size_t{z} * dims.x * dims.y;
   for (std::uint32_t y = 0; y < dims.y; ++y) {
     const float* const row = field.values.data() + sample;
@@ -47,15 +110,21 @@ void visit_crossed(const Field& field, std::uint32_t z, Visit visit) {
     unsigned signs = signs_at(0);
     for (std::uint32_t x = 0; x < dims.x; ++x, ++sample) {
       signs = (signs >> 1 & 0b01010101U) | signs_at(std::ptrdiff_t{x} + 1);
-      if (signs == 0 || signs == 0xFF) continue;
-      const CellSplit& split = cell_split(field.scheme, ((x + y + z) & 1) != 0);
-      const unsigned outside = ~(steps | (x + 1 < dims.x ? 1U : 0U));
-      unsigned set = 0;
-      for (unsigned left = split.crossed[signs]; left != 0; left &= left - 1) {
-        const auto d = static_cast<unsigned>(std::countr_zero(left));
-        if ((d & outside) == 0) set |= 1U << d;
+      const unsigned all_steps = steps | (x + 1 < dims.x ? 1U : 0U);
+      if (is_bcc) {
+        const unsigned set = crossed_slots(field, sample, signs, all_steps);
+        const bool has_centre = field.values[field.first_centre + sample] != kNoCentre;
+        if (set != 0) visit(sample, set, edges[has_centre ? 1 : 0]);
+        continue;
       }
-      if (set != 0) visit(sample, set, split);
+      if (signs == 0 || signs == 0xFF) continue;
+      const unsigned odd = (x + y + z) & 1;
+      unsigned set = 0;
+      for (unsigned left = splits[odd]->crossed[signs]; left != 0; left &= left - 1) {
+        const auto d = static_cast<unsigned>(std::countr_zero(left));
+        if ((d & ~all_steps) == 0) set |= 1U << d;
+      }
+      if (set != 0) visit(sample, set, edges[odd]);
     }
   }
 }
@@ -76,20 +145,35 @@ std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions&
   field->dims = dims;
   field->margin = margin;
   field->scheme = options.scheme;
-  const auto value_of = [&](T sample) {
-    const double difference = static_cast<double>(sample) - options.iso;
+  const auto value_of = [&](double sample) {
+    const double difference = sample - options.iso;
     const auto scaled = static_cast<float>(std::scalbn(std::abs(difference), exponent));
     const float value = is_sign ? 1 : std::max(scaled, kLeast);
-    return static_cast<double>(sample) >= options.iso ? value : -value;
+    return sample >= options.iso ? value : -value;
   };
-  field->values.assign(dims.samples() + static_cast<std::size_t>(field->step_z()) + dims.x + 2,
-                       margin == 0 ? 0 : kPhantom);
+  const std::size_t layer = std::size_t{dims.x} * dims.y;
+  field->values.assign(dims.samples() + layer + dims.x + 2, margin == 0 ? 0 : kPhantom);
+  const bool has_centres = options.scheme == Scheme::kBcc;
+  if (has_centres) {
+    // The layers before and behind have none.
+    const std::size_t first = field->values.size() + layer;
+    if (first + dims.samples() > std::numeric_limits<std::uint32_t>::max()) return {};
+    field->first_centre = static_cast<std::uint32_t>(first);
+    field->values.resize(first + dims.samples() + layer, kNoCentre);
+  }
   parallel_for(context, inner.z, [&](std::size_t z) {
     const T* from = lattice.samples + z * inner.x * inner.y;
     for (std::size_t y = 0; y < inner.y; ++y, from += inner.x) {
       const std::size_t row = ((z + margin) * dims.y + y + margin) * dims.x + margin;
-      std::transform(from, from + inner.x, field->values.begin() + static_cast<std::ptrdiff_t>(row),
-                     value_of);
+      const auto at = [&](std::size_t point) {
+        return field->values.begin() + static_cast<std::ptrdiff_t>(point);
+      };
+      std::transform(from, from + inner.x, at(row), value_of);
+      if (!has_centres || y + 1 == inner.y || z + 1 == inner.z) continue;
+      for (std::size_t x = 0; x + 1 < inner.x; ++x) {
+        *at(field->first_centre + row + x) =
+            value_of(mean_of_cell(from + x, sample_offset(inner, 2), sample_offset(inner, 4)));
+      }
     }
   });
   return field;
@@ -102,7 +186,7 @@ Crossings crossings_of(const Field& field, const Context& context) {
   parallel_for(context, field.dims.z, [&](std::size_t z) {
     std::size_t count = 0;
     visit_crossed(field, static_cast<std::uint32_t>(z),
-                  [&](std::size_t, unsigned set, const CellSplit&) {
+                  [&](std::size_t, unsigned set, const EdgeOffsets&) {
                     count += static_cast<std::size_t>(std::popcount(set));
                   });
     begin[z + 1] = count;
@@ -111,20 +195,18 @@ Crossings crossings_of(const Field& field, const Context& context) {
   crossings.all.resize(begin.back());
   parallel_for(context, field.dims.z, [&](std::size_t z) {
     Crossing* out = crossings.all.data() + begin[z];
-    visit_crossed(field, static_cast<std::uint32_t>(z),
-                  [&](std::size_t sample, unsigned set, const CellSplit& split) {
-                    for (; set != 0; set &= set - 1) {
-                      const EdgeEnds& ends =
-                          split.ends[static_cast<unsigned>(std::countr_zero(set))];
-                      const auto end = [&](unsigned corner) {
-                        return static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(sample) +
-                                                          sample_offset(field.dims, corner));
-                      };
-                      const bool is_inside = field.values[end(ends.from)] > 0;
-                      *out++ = is_inside ? Crossing{end(ends.from), end(ends.to)}
-                                         : Crossing{end(ends.to), end(ends.from)};
-                    }
-                  });
+    visit_crossed(
+        field, static_cast<std::uint32_t>(z),
+        [&](std::size_t sample, unsigned set, const EdgeOffsets& edges) {
+          for (; set != 0; set &= set - 1) {
+            const auto point = [&](std::ptrdiff_t offset) {
+              return static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(sample) + offset);
+            };
+            const auto& [a, b] = edges[static_cast<unsigned>(std::countr_zero(set))];
+            const bool is_inside = field.values[point(a)] > 0;
+            *out++ = is_inside ? Crossing{point(a), point(b)} : Crossing{point(b), point(a)};
+          }
+        });
   });
   return crossings;
 }
@@ -133,22 +215,27 @@ std::vector<std::uint8_t> leave_out(std::span<const std::uint64_t> kept, const C
                                     Field& field, Crossings& crossings) {
   const Dims dims = field.dims;
   const std::size_t plane = std::size_t{dims.x} * dims.y;
-  // A sample is turned if a way from the first one crosses what is left out an odd number of times:
-  // any way, here along z, then y, then x.
-  std::vector<std::vector<bool>> is_turned(dims.z, std::vector<bool>(plane, false));
+  // A point is turned if a way from the first sample crosses what is left out an odd number of
+  // times: any way, here along z, then y, then x, and from a cell's corner 0 to its centre.
+  using Flags = std::vector<bool>;
+  std::vector<Flags> is_turned(dims.z, Flags(plane, false));
+  std::vector<Flags> centre_turns(field.scheme == Scheme::kBcc ? dims.z : 0, Flags(plane, false));
   std::vector<std::uint8_t> next_turns(dims.z, 0);  // between planes
   parallel_for(context, dims.z, [&](std::size_t z) {
-    std::vector<bool>& turned = is_turned[z];
+    Flags& turned = is_turned[z];
     std::size_t number = crossings.layer_begin[z];
     visit_crossed(field, static_cast<std::uint32_t>(z),
-                  [&](std::size_t sample, unsigned set, const CellSplit&) {
+                  [&](std::size_t sample, unsigned set, const EdgeOffsets& edges) {
                     const std::size_t at = sample - z * plane;
                     for (; set != 0; set &= set - 1, ++number) {
                       if ((kept[number / kFlagBits] >> (number % kFlagBits) & 1) != 0) continue;
-                      const auto direction = static_cast<unsigned>(std::countr_zero(set));
-                      if (direction == 1) turned[at + 1] = true;
-                      if (direction == 2 && at % dims.x == 0) turned[at + dims.x] = true;
-                      if (direction == 4 && at == 0) next_turns[z] = 1;
+                      const auto [a, b] = edges[static_cast<unsigned>(std::countr_zero(set))];
+                      if (std::min(a, b) != 0) continue;  // of no such way
+                      const auto way = static_cast<std::size_t>(std::max(a, b));
+                      if (way == 1) turned[at + 1] = true;
+                      if (way == dims.x && at % dims.x == 0) turned[at + dims.x] = true;
+                      if (way == plane && at == 0) next_turns[z] = 1;
+                      if (way == field.first_centre) centre_turns[z][at] = true;
                     }
                   });
     for (std::size_t y = 1; y < dims.y; ++y) {
@@ -163,17 +250,26 @@ std::vector<std::uint8_t> leave_out(std::span<const std::uint64_t> kept, const C
     if (is_plane_turned) is_turned[z].flip();
     is_plane_turned = is_plane_turned != (next_turns[z] != 0);
   }
+  const auto is_centre_turned = [&](std::size_t z, std::size_t at) {
+    return is_turned[z][at] != centre_turns[z][at];
+  };
   parallel_for(context, dims.z, [&](std::size_t z) {
     float* const values = field.values.data() + z * plane;
     for (std::size_t at = 0; at < plane; ++at) {
       if (is_turned[z][at]) values[at] = -values[at];
+      if (centre_turns.empty() || !is_centre_turned(z, at)) continue;
+      values[field.first_centre + at] = -values[field.first_centre + at];
     }
   });
   crossings = crossings_of(field, context);
   std::vector<std::uint8_t> flags(crossings.all.size(), 0);
   for_each(context, flags.size(), [&](std::size_t v) {
     const std::uint32_t inside = crossings.all[v].inside;
-    flags[v] = is_turned[inside / plane][inside % plane] ? 1 : 0;
+    const bool is_centre = field.is_centre(inside);
+    const std::uint32_t sample = is_centre ? inside - field.first_centre : inside;
+    const std::size_t z = sample / plane;
+    const std::size_t at = sample % plane;
+    flags[v] = (is_centre ? is_centre_turned(z, at) : is_turned[z][at]) ? 1 : 0;
   });
   if (std::ranges::find(flags, 1) == flags.end()) flags.clear();
   return flags;
@@ -183,7 +279,7 @@ PlaneCrossings::PlaneCrossings(const Field& field, const Crossings& crossings, s
     : begin_(std::size_t{z} * field.dims.x * field.dims.y),
       samples_(std::size_t{field.dims.x} * field.dims.y) {
   auto next = static_cast<std::uint32_t>(crossings.layer_begin[z]);
-  visit_crossed(field, z, [&](std::size_t sample, unsigned set, const CellSplit&) {
+  visit_crossed(field, z, [&](std::size_t sample, unsigned set, const EdgeOffsets&) {
     samples_[sample - begin_] = {next, set};
     next += static_cast<std::uint32_t>(std::popcount(set));
   });
@@ -203,15 +299,23 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
   const double of_caps =
       field.margin == 0 ? 0 : -kLargest / double{kPhantom} * metric.largest_step();
   if (options.interpolation == Interpolation::kMidpoint) return of_caps;
-  const auto difference = [&](std::uint32_t sample) {
-    const Vecd at = field.place(sample) - Vecd{1, 1, 1} * field.margin;
+  const auto difference = [&](std::uint32_t point) {
+    const bool is_centre = field.is_centre(point);
+    const Vecd at =
+        field.place(is_centre ? point - field.first_centre : point) - Vecd{1, 1, 1} * field.margin;
     const Dims& inner = lattice.dims;
-    const auto number = static_cast<std::size_t>(at.x + inner.x * (at.y + inner.y * at.z));
-    return static_cast<double>(lattice.samples[number]) - options.iso;
+    const T* sample =
+        lattice.samples + static_cast<std::size_t>(at.x + inner.x * (at.y + inner.y * at.z));
+    const double value =
+        is_centre ? mean_of_cell(sample, sample_offset(inner, 2), sample_offset(inner, 4))
+                  : static_cast<double>(*sample);
+    return value - options.iso;
   };
   // Vertices keep away from samples.
   const double nearest = Placement::nearest_share(lattice.dims, lattice.to_space);
   const double kept = field.margin == 0 ? nearest : nearest_on_border(nearest);
+  // An edge from a centre to a sample is shorter.
+  const double kept_of_half = std::max(kept, std::min(2 * nearest, kMostNearest));
   std::vector<double> most(chunks_of(crossings.size()), of_caps);
   for_chunks(context, crossings.size(), [&](std::size_t begin, std::size_t end) {
     double& farthest = most[begin / kChunk];
@@ -223,7 +327,9 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
       const double q = field.values[outside];
       // The difference of two doubles can overflow; that of their halves cannot.
       const double share = std::isinf(a - b) ? (a / 2) / (a / 2 - b / 2) : a / (a - b);
-      const double placed = std::clamp(share, kept, 1 - kept);
+      const bool is_half = field.is_centre(inside) != field.is_centre(outside);
+      const double off_ends = is_half ? kept_of_half : kept;
+      const double placed = std::clamp(share, off_ends, 1 - off_ends);
       const double moved = std::abs(placed - p / (p - q)) *
                            length(metric.mm(field.place(outside) - field.place(inside)));
       if (!(moved <= farthest)) farthest = moved;

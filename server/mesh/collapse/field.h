@@ -1,5 +1,6 @@
 // The field F = sample - iso-value, scaled, whose zero set is the surface S: linear in each
-// tetrahedron of the five- or six-way split (tetrahedra.h); private to this folder.
+// tetrahedron of the five- or six-way split (tetrahedra.h), or of the body-centred lattice
+// (bcc_faces.h); private to this folder.
 #pragma once
 
 #include <array>
@@ -20,16 +21,21 @@ namespace isomesh::mesh::collapse {
 // below 256 are below 1e-10, and beside phantoms below 1e-8.
 inline constexpr double kMargin = 1e-7;
 inline constexpr float kPhantom = -4194304;  // -2^22
+inline constexpr float kNoCentre = 0;        // of a cell that has none
 
-// Samples inside are positive, the others negative, and none is nearer to zero than 1e-6. With
-// midpoint placement they are 1 and -1. Around a surface that is closed there are some layers of
-// kPhantom, so that it ends that little outside of the volume: see shift_of. Immutable once made,
-// so safe to read from several threads.
+// Points are samples and, on the body-centred lattice, centres of cells. Those inside are positive,
+// the others negative, and none is nearer to zero than 1e-6. With midpoint placement they are 1 and
+// -1. Around a surface that is closed there are some layers of kPhantom, so that it ends that
+// little outside of the volume: see shift_of. Immutable once made, so safe to read from several
+// threads.
 struct Field {
-  Dims dims;                     // with the layers around the volume
-  std::uint32_t margin = 0;      // how many those are on each side
-  Scheme scheme = Scheme::kSix;  // or kFive
-  std::vector<float> values;     // and one layer more, which is read with a weight of zero
+  Dims dims;                 // with the layers around the volume
+  std::uint32_t margin = 0;  // how many those are on each side
+  Scheme scheme = Scheme::kSix;
+  // Of each point: first those of the samples, and one layer more, which is read with a weight of
+  // zero. The centre of the cell whose corner 0 is sample s is point s + first_centre.
+  std::vector<float> values;
+  std::uint32_t first_centre = ~std::uint32_t{0};
 
   std::ptrdiff_t step_y() const { return dims.x; }
   std::ptrdiff_t step_z() const { return std::ptrdiff_t{dims.x} * dims.y; }
@@ -46,11 +52,15 @@ struct Field {
     };
     return is_between(p.x, dims.x) && is_between(p.y, dims.y) && is_between(p.z, dims.z);
   }
-  bool is_phantom(std::uint32_t sample) const { return values[sample] == kPhantom; }
-  Vecd place(std::uint32_t sample) const {
+  bool is_phantom(std::uint32_t point) const { return values[point] == kPhantom; }
+  bool is_centre(std::uint32_t point) const { return point >= first_centre; }
+  Vecd place(std::uint32_t point) const {
+    const std::uint32_t sample = is_centre(point) ? point - first_centre : point;
     const std::uint32_t row = sample / dims.x;
-    return {static_cast<double>(sample % dims.x), static_cast<double>(row % dims.y),
-            static_cast<double>(row / dims.y)};
+    const double half = is_centre(point) ? 0.5 : 0;
+    return Vecd{static_cast<double>(sample % dims.x), static_cast<double>(row % dims.y),
+                static_cast<double>(row / dims.y)} +
+           Vecd{half, half, half};
   }
 };
 
@@ -70,7 +80,7 @@ std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions&
                                 std::uint32_t margin, const Context& context);
 
 // All crossings, in the order in which extraction numbers its vertices: by the samples that own
-// their edges, and by direction.
+// their edges, and by direction or slot.
 struct Crossings {
   std::vector<Crossing> all;
   std::vector<std::size_t> layer_begin;  // of those that a plane's samples own, and the end
@@ -91,14 +101,14 @@ class PlaneCrossings {
  public:
   PlaneCrossings(const Field& field, const Crossings& crossings, std::uint32_t z);
 
-  // The number of the crossing on a sample's edge of a direction 1..7, which must be crossed. The
-  // sample must be one of this plane.
-  bool is_crossed(std::size_t sample, unsigned direction) const {
-    return (samples_[sample - begin_].set >> direction & 1) != 0;
+  // The number of the crossing on a sample's edge of a direction 1..7, or of a slot, which must be
+  // crossed. The sample must be one of this plane.
+  bool is_crossed(std::size_t sample, unsigned edge) const {
+    return (samples_[sample - begin_].set >> edge & 1) != 0;
   }
-  std::uint32_t number_of(std::size_t sample, unsigned direction) const {
+  std::uint32_t number_of(std::size_t sample, unsigned edge) const {
     const Sample& owner = samples_[sample - begin_];
-    const unsigned before = owner.set & ((1U << direction) - 1);
+    const unsigned before = owner.set & ((1U << edge) - 1);
     return owner.first + static_cast<std::uint32_t>(std::popcount(before));
   }
 

@@ -108,6 +108,66 @@ struct Five {
   }
 };
 
+struct Bcc {
+  static constexpr std::array<Vecd, 9> kNumbers = {{{1, 0, 0},
+                                                    {0, 1, 0},
+                                                    {0, 0, 1},
+                                                    {1, -1, 0},
+                                                    {0, 1, -1},
+                                                    {1, 0, -1},
+                                                    {1, 1, 0},
+                                                    {0, 1, 1},
+                                                    {1, 0, 1}}};
+  static constexpr std::array<Cut, 10> kCuts = {
+      {{3, 6}, {3, 4}, {3, 7}, {3, 2}, {6, 7}, {6, 4}, {4, 7}, {4, 0}, {5, 8}, {5, 1}}};
+
+  // F between the centre of a cell and the face that the place is nearest to: the centre's share is
+  // how near it is, and the rest is F on the face, where the ray from the centre meets it. Beside
+  // phantoms cells are Kuhn's.
+  static double value(const Place& place, const Field& field) {
+    const float* const centre = place.corner + field.first_centre;
+    if (*centre == kNoCentre) return Six::value(place, field);
+    const std::array<double, 3> from_centre = {place.in_cell.x - 0.5, place.in_cell.y - 0.5,
+                                               place.in_cell.z - 0.5};
+    const std::array<std::ptrdiff_t, 3> steps = {1, field.step_y(), field.step_z()};
+    std::size_t axis = 0;
+    for (const std::size_t other : {1U, 2U}) {
+      if (std::abs(from_centre[other]) > std::abs(from_centre[axis])) axis = other;
+    }
+    const bool is_high = from_centre[axis] > 0;
+    const double share = 2 * std::abs(from_centre[axis]);
+    const float* const p = place.corner + (is_high ? steps[axis] : 0);
+    const std::ptrdiff_t up_s = steps[(axis + 1) % 3];
+    const std::ptrdiff_t up_t = steps[(axis + 2) % 3];
+    // Times the share, as F on the face is.
+    const double s = from_centre[(axis + 1) % 3] + share / 2;
+    const double t = from_centre[(axis + 2) % 3] + share / 2;
+    const float beyond = centre[is_high ? steps[axis] : -steps[axis]];
+    const double a = p[0];
+    const double b = p[up_s];
+    const double c = p[up_t];
+    const double d = p[up_s + up_t];
+    double on_face = 0;
+    if (beyond == kNoCentre) {
+      on_face =
+          s >= t ? a * (share - s) + b * (s - t) + d * t : a * (share - t) + c * (t - s) + d * s;
+    } else {
+      // Both diagonals cut it, and its middle has the mean of the centres.
+      const double middle = (double{*centre} + double{beyond}) / 2;
+      const double low = std::min({s, t, share - s, share - t});
+      const double of_b_or_d = s - low;  // along a side of a and b, or of c and d
+      const double of_c_or_d = t - low;  // along a side of a and c, or of b and d
+      const double rest = share - 2 * low;
+      const double on_sides = low == t           ? a * (rest - of_b_or_d) + b * of_b_or_d
+                              : low == share - t ? c * (rest - of_b_or_d) + d * of_b_or_d
+                              : low == s         ? a * (rest - of_c_or_d) + c * of_c_or_d
+                                                 : b * (rest - of_c_or_d) + d * of_c_or_d;
+      on_face = 2 * low * middle + on_sides;
+    }
+    return (1 - share) * double{*centre} + on_face;
+  }
+};
+
 template <class Scheme>
 class Signs {
  public:
@@ -187,28 +247,36 @@ class Signs {
   const double sign_;
 };
 
+template <class Test>
+bool with_scheme(const Field& field, double sign, Test test) {
+  switch (field.scheme) {
+    case Scheme::kSix:
+      return test(Signs<Six>(field, sign));
+    case Scheme::kFive:
+      return test(Signs<Five>(field, sign));
+    case Scheme::kBcc:
+      return test(Signs<Bcc>(field, sign));
+  }
+  return false;
+}
+
 }  // namespace
 
 bool OneSign::at(Vecd p) const {
   const auto is_within = [](double x, std::uint32_t samples) {
     return x >= 0 && x <= samples - 1.0;
   };
-  if (!is_within(p.x, field_.dims.x) || !is_within(p.y, field_.dims.y) ||
-      !is_within(p.z, field_.dims.z)) {
-    return false;
-  }
-  return field_.scheme == Scheme::kSix ? Signs<Six>(field_, sign_).at(p)
-                                       : Signs<Five>(field_, sign_).at(p);
+  return is_within(p.x, field_.dims.x) && is_within(p.y, field_.dims.y) &&
+         is_within(p.z, field_.dims.z) &&
+         with_scheme(field_, sign_, [&](const auto& signs) { return signs.at(p); });
 }
 
 bool OneSign::along(Vecd p, Vecd q) const {
-  return field_.scheme == Scheme::kSix ? Signs<Six>(field_, sign_).along(p, q)
-                                       : Signs<Five>(field_, sign_).along(p, q);
+  return with_scheme(field_, sign_, [&](const auto& signs) { return signs.along(p, q); });
 }
 
 bool OneSign::within(Vecd a, Vecd b, Vecd c) const {
-  return field_.scheme == Scheme::kSix ? Signs<Six>(field_, sign_).within(a, b, c)
-                                       : Signs<Five>(field_, sign_).within(a, b, c);
+  return with_scheme(field_, sign_, [&](const auto& signs) { return signs.within(a, b, c); });
 }
 
 }  // namespace isomesh::mesh::collapse

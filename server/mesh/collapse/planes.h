@@ -6,7 +6,10 @@
 //  * six-way: x, y, z, x-y, y-z, x-z, and lines in 7 directions;
 //  * five-way: x, y, z, (x+y+z)/2, (-x+y+z)/2, (x-y+z)/2, (x+y-z)/2, counted from a sample of even
 //    i+j+k, and lines in 9 directions: along the axes, and through even samples along the diagonals
-//    of faces.
+//    of faces;
+//  * body-centred: x-y, y-z, x-z, x+y, y+z, x+z, and lines in 7 directions: along the axes, and
+//    along the diagonals of cells, through samples and centres. Cells with a phantom are split in
+//    six, and faces at the border as there: x, y, z, and lines along the diagonals of faces.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +21,16 @@
 
 namespace isomesh::mesh::collapse {
 
-// A place by the numbers of up to seven families, counted from some sample. Those of no family
-// never meet a plane.
-struct alignas(32) PlaneNumbers {
-  std::array<float, 8> of;
+// A place by its numbers of families, of which x, y and z are the first, counted from some sample.
+// Those of no family never meet a plane.
+template <std::size_t kPlaces>
+struct alignas(32) NumbersOf {
+  std::array<float, kPlaces> of;
 };
 
 // The lines of one direction: the two families whose numbers i and j tell them apart, and the one
 // whose number k counts the samples along a line. Sample (i, j, k) is so many steps along x, y, z
-// away.
+// away; on the body-centred lattice the place is so many half steps away.
 struct LineDirection {
   std::uint8_t first;
   std::uint8_t second;
@@ -41,6 +45,7 @@ struct SampleSteps {
   std::ptrdiff_t x = 1;
   std::ptrdiff_t y = 0;
   std::ptrdiff_t z = 0;
+  std::ptrdiff_t centre = 0;  // to the centre of its cell, on the body-centred lattice
 
   std::ptrdiff_t to(const std::array<std::int8_t, 3>& steps) const {
     return steps[0] * x + steps[1] * y + steps[2] * z;
@@ -48,6 +53,7 @@ struct SampleSteps {
 };
 
 struct SixPlanes {
+  using Numbers = NumbersOf<8>;
   static constexpr std::size_t kFamilies = 6;
   static constexpr std::array<LineDirection, 7> kLines = {{
       {1, 2, 0, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}},
@@ -61,7 +67,7 @@ struct SixPlanes {
 
   // The sample before a place, to count from.
   static Vecd base_of(Vecd cell) { return cell; }
-  static PlaneNumbers numbers(Vecf d) {
+  static Numbers numbers(Vecf d) {
     return {{d.x, d.y, d.z, d.x - d.y, d.y - d.z, d.x - d.z, 0.5F, 0.5F}};
   }
   // F in a cell at the place (a, b, c) in it.
@@ -69,6 +75,7 @@ struct SixPlanes {
 };
 
 struct FivePlanes {
+  using Numbers = NumbersOf<8>;
   static constexpr std::size_t kFamilies = 7;
   static constexpr std::array<LineDirection, 9> kLines = {{
       {1, 2, 0, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}},
@@ -86,10 +93,33 @@ struct FivePlanes {
     const double sum = cell.x + cell.y + cell.z;
     return sum / 2 == std::floor(sum / 2) ? cell : cell + Vecd{1, 0, 0};
   }
-  static PlaneNumbers numbers(Vecf d) {
+  static Numbers numbers(Vecf d) {
     const float half = 0.5F;
     return {{d.x, d.y, d.z, (d.x + d.y + d.z) * half, (d.y - d.x + d.z) * half,
              (d.x - d.y + d.z) * half, (d.x + d.y - d.z) * half, half}};
+  }
+  static double value(const float* corner, const SampleSteps& steps, bool is_odd, Vecd in_cell);
+};
+
+struct BccPlanes {
+  using Numbers = NumbersOf<16>;
+  static constexpr std::size_t kFamilies = 9;
+  static constexpr std::array<LineDirection, 10> kLines = {{
+      {7, 4, 0, {0, 1, 1}, {0, 1, -1}, {2, 0, 0}},
+      {8, 5, 1, {1, 0, 1}, {1, 0, -1}, {0, 2, 0}},
+      {6, 3, 2, {1, 1, 0}, {1, -1, 0}, {0, 0, 2}},
+      {3, 4, 2, {2, 0, 0}, {2, 2, 0}, {2, 2, 2}},
+      {3, 7, 1, {2, 0, 0}, {0, 0, 2}, {2, 2, -2}},
+      {6, 7, 1, {2, 0, 0}, {0, 0, 2}, {-2, 2, -2}},
+      {6, 4, 1, {2, 0, 0}, {0, 0, -2}, {-2, 2, 2}},
+      {3, 2, 1, {2, 0, 0}, {0, 0, 2}, {2, 2, 0}},
+      {4, 0, 2, {0, 2, 0}, {2, 0, 0}, {0, 2, 2}},
+      {5, 1, 2, {2, 0, 0}, {0, 2, 0}, {2, 0, 2}},
+  }};
+
+  static Vecd base_of(Vecd cell) { return cell; }
+  static Numbers numbers(Vecf d) {
+    return {{d.x, d.y, d.z, d.x - d.y, d.y - d.z, d.x - d.z, d.x + d.y, d.y + d.z, d.x + d.z}};
   }
   static double value(const float* corner, const SampleSteps& steps, bool is_odd, Vecd in_cell);
 };

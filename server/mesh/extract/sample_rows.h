@@ -76,9 +76,7 @@ class SampleRows {
   virtual void shares(const RowEdges& row, double* out) const = 0;
 
   // Sets those bits of `out` whose cells' means of eight samples are inside, of the cells that are
-  // in `uncertain`. Bit x is the cell that begins at sample x - `margin` of the row. The sums of
-  // integers are exact; those of others are in double precision, in an order that is always the
-  // same, and are compared before they are rounded to less.
+  // in `uncertain`. Bit x is the cell that begins at sample x - `margin` of the row (cell_mean.h).
   virtual void add_centres(std::uint32_t y, std::uint32_t z, std::uint32_t margin,
                            std::span<const std::uint64_t> uncertain, std::uint64_t* out) const = 0;
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -51,39 +52,46 @@ struct Scene {
 };
 
 // A large ball, a small one, and a tunnel that leaves the volume through a face.
-Scene balls_and_tunnel() {
+Scene balls_and_tunnel(Scheme scheme) {
   const auto field = [](const test::Point& p) {
     const double large = 5.1 - std::hypot(p[0] - 8, p[1] - 8, p[2] - 8);
     const double small = 2.2 - std::hypot(p[0] - 18, p[1] - 7, p[2] - 8);
     const double tunnel = 2.4 - std::hypot(p[1] - 16, p[2] - 12);
     return std::max({large, small, tunnel});
   };
-  return Scene(test::sample<float>(field, {24, 22, 18}));
+  return Scene(test::sample<float>(field, {24, 22, 18}), {.scheme = scheme});
 }
 
-TEST(BoundProofTest, HoldsForATube) {
-  const Scene scene = balls_and_tunnel();
+class BoundProofTest : public testing::TestWithParam<Scheme> {};
+
+INSTANTIATE_TEST_SUITE_P(Schemes, BoundProofTest, testing::ValuesIn(test::kSchemes),
+                         [](const auto& test) {
+                           return std::to_string(static_cast<int>(test.param));
+                         });
+
+TEST_P(BoundProofTest, HoldsForATube) {
+  const Scene scene = balls_and_tunnel(GetParam());
   EXPECT_TRUE(scene.prove().holds());
   EXPECT_EQ(scene.components.count, 3U);
   EXPECT_LT(scene.tube.triangles.size(), scene.mesh.triangles.size() / 2);
 }
 
-TEST(BoundProofTest, RefusesARemovedTriangle) {
-  Scene scene = balls_and_tunnel();
+TEST_P(BoundProofTest, RefusesARemovedTriangle) {
+  Scene scene = balls_and_tunnel(GetParam());
   scene.tube.triangles.erase(scene.tube.triangles.begin() + 20);
   EXPECT_GT(scene.prove().open_edges, 0U);
 }
 
-TEST(BoundProofTest, RefusesAPushedVertex) {
-  Scene scene = balls_and_tunnel();
+TEST_P(BoundProofTest, RefusesAPushedVertex) {
+  Scene scene = balls_and_tunnel(GetParam());
   Vertex& vertex = scene.tube.vertices[scene.tube.triangles[20][0]];
   const Vecf push = (vertex.in - vertex.out) * 0.75F;
   vertex = {vertex.p + push, snap(wide(vertex.in + push)), snap(wide(vertex.out + push))};
   EXPECT_GT(scene.prove().unclear_triangles, 0U);
 }
 
-TEST(BoundProofTest, RefusesARemovedComponent) {
-  Scene scene = balls_and_tunnel();
+TEST_P(BoundProofTest, RefusesARemovedComponent) {
+  Scene scene = balls_and_tunnel(GetParam());
   std::erase_if(scene.tube.triangles, [&](const Triangle& triangle) {
     const Vecf p = scene.tube.vertices[triangle[0]].p;
     return p.x > 15 && p.y < 11;
@@ -94,8 +102,8 @@ TEST(BoundProofTest, RefusesARemovedComponent) {
 }
 
 // The tunnel's end is closed by a fan that lies in the volume's face.
-TEST(BoundProofTest, RefusesAClosedHole) {
-  Scene scene = balls_and_tunnel();
+TEST_P(BoundProofTest, RefusesAClosedHole) {
+  Scene scene = balls_and_tunnel(GetParam());
   std::vector<Triangle> fan;
   std::optional<std::uint32_t> hub;
   for (const Triangle& triangle : scene.tube.triangles) {
@@ -113,8 +121,8 @@ TEST(BoundProofTest, RefusesAClosedHole) {
   EXPECT_FALSE(scene.prove().holds());
 }
 
-TEST(BoundProofTest, RefusesABorderThatLeftItsFace) {
-  Scene scene = balls_and_tunnel();
+TEST_P(BoundProofTest, RefusesABorderThatLeftItsFace) {
+  Scene scene = balls_and_tunnel(GetParam());
   for (const std::uint32_t v : scene.tube.triangles.back()) {
     if (scene.tube.border[v] != 0) scene.tube.vertices[v].p.x -= 0.01F;
   }
@@ -125,12 +133,13 @@ TEST(BoundProofTest, RefusesABorderThatLeftItsFace) {
 }
 
 // The bound of a file follows from where its vertices are.
-TEST(BoundProofTest, TellsThatAVertexWasMoved) {
-  const Scene scene = balls_and_tunnel();
-  Mesh mesh = test::extracted(scene.volume, {});
+TEST_P(BoundProofTest, TellsThatAVertexWasMoved) {
+  const Scene scene = balls_and_tunnel(GetParam());
+  const ExtractOptions options = {.scheme = GetParam()};
+  Mesh mesh = test::extracted(scene.volume, options);
   std::string why_not;
   const auto bound =
-      simplify_within(scene.volume.lattice(), {}, {.max_error_mm = 0.2}, {}, mesh, why_not);
+      simplify_within(scene.volume.lattice(), options, {.max_error_mm = 0.2}, {}, mesh, why_not);
   ASSERT_TRUE(bound);
   mesh.positions[7][1] += 0.3F;
   EXPECT_GT(bound->bound_at(mesh.positions.span()), 0.2);

@@ -91,9 +91,9 @@ template <class Planes>
 bool is_clear(const Field& field, const std::array<Vecf, 3>& p, double sign) {
   Clear<Planes> clear(field);
   clear.base(p[0]);
-  const PlaneNumbers a = clear.at(p[0]);
-  const PlaneNumbers b = clear.at(p[1]);
-  const PlaneNumbers c = clear.at(p[2]);
+  const auto a = clear.at(p[0]);
+  const auto b = clear.at(p[1]);
+  const auto c = clear.at(p[2]);
   return clear.point(a, sign) && clear.point(b, sign) && clear.point(c, sign) &&
          clear.edge(a, b, sign) && clear.edge(b, c, sign) && clear.edge(c, a, sign) &&
          clear.inside(a, b, c, sign);
@@ -117,15 +117,15 @@ double least_value(const Field& field, const std::array<Vecf, 3>& p, double sign
 
 // Calls body(field, triangle, sign) for many of them, in noise.
 template <class Body>
-void for_random_triangles(Scheme scheme, Body body) {
+void for_random_triangles(Scheme scheme, Body body, std::uint32_t margin = 0) {
   const Dims dims = {9, 8, 7};
-  RandomTriangles triangles(dims);
+  RandomTriangles triangles({dims.x + 2 * margin, dims.y + 2 * margin, dims.z + 2 * margin});
   std::optional<Field> field;
   for (int n = 0; n < 4000; ++n) {
     if (n % 100 == 0) {
       const auto volume = test::noise_between<float>(-0.25, n % 300 == 0 ? 0.75 : 1.75, dims,
                                                      static_cast<std::uint64_t>(n));
-      field = make_field(volume.lattice(), {.scheme = scheme}, 0, {});
+      field = make_field(volume.lattice(), {.scheme = scheme}, margin, {});
     }
     body(*field, triangles.next(), n % 5 == 0 ? -1.0 : 1.0);
   }
@@ -152,6 +152,69 @@ void expect_agreement(Scheme scheme) {
 
 TEST(BoundSignsTest, AgreeWithManyValues) { expect_agreement<SixPlanes>(Scheme::kSix); }
 TEST(BoundSignsTest, AgreeWithManyValuesOfFive) { expect_agreement<FivePlanes>(Scheme::kFive); }
+
+TEST(BoundSignsTest, AgreeWithManyValuesOfBcc) { expect_agreement<BccPlanes>(Scheme::kBcc); }
+
+// Beside phantoms, where cells have no centres.
+TEST(BoundSignsTest, AgreeAroundAClosedVolumeOfBcc) {
+  std::array<int, 2> clear = {};
+  for_random_triangles(
+      Scheme::kBcc,
+      [&](const Field& field, const std::array<Vecf, 3>& p, double sign) {
+        const bool is_fast = is_clear<BccPlanes>(field, p, sign);
+        EXPECT_EQ(is_fast, has_one_sign(OneSign(field, sign), wide(p[0]), wide(p[1]), wide(p[2])));
+        if (!is_fast) return;
+        EXPECT_GT(least_value(field, p, sign), 0);
+        ++clear[sign > 0 ? 0 : 1];
+      },
+      2);
+  EXPECT_GT(clear[0], 200);
+  EXPECT_GT(clear[1], 200);
+}
+
+// F of the body-centred lattice by its definition: in tetrahedra between two centres and a side of
+// the face between their cells, and at the border between a centre and half a face.
+TEST(BoundSignsTest, BccFollowsItsTetrahedra) {
+  const Dims dims = {5, 4, 6};
+  const auto volume = test::noise_between<float>(-0.25, 0.75, dims, 3);
+  const auto field = make_field(volume.lattice(), {.scheme = Scheme::kBcc}, 0, {});
+  ASSERT_TRUE(field);
+  RandomTriangles random(dims);
+  const auto value = [&](const Vecd& p) { return value_at(*field, narrow(p)); };
+  const auto sample_at = [](double x, double y, double z) { return Vecd{x, y, z}; };
+  const auto expect_linear = [&](const std::array<Vecd, 4>& corners) {
+    std::array<double, 4> weights;
+    double sum = 0;
+    for (double& weight : weights) sum += weight = random.number();
+    Vecd at;
+    double expected = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      at = at + corners[i] * (weights[i] / sum);
+      expected += value(corners[i]) * (weights[i] / sum);
+    }
+    EXPECT_NEAR(value(at), expected, 2e-3);  // places are in single precision
+  };
+  for (int n = 0; n < 4000; ++n) {
+    const auto cell = [&](std::uint32_t samples) {
+      return std::floor(random.number() * (samples - 1));
+    };
+    const Vecd low = sample_at(cell(dims.x), cell(dims.y), cell(dims.z));
+    const Vecd centre = low + Vecd{0.5, 0.5, 0.5};
+    std::array<Vecd, 3> axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    std::rotate(axes.begin(), axes.begin() + n % 3, axes.end());
+    const auto& [normal, u, v] = axes;
+    const bool is_high = random.number() < 0.5;
+    const Vecd face = is_high ? low + normal : low;
+    const Vecd beyond = is_high ? centre + normal : centre - normal;
+    const std::array<Vecd, 4> square = {face, face + u, face + u + v, face + v};
+    if (field->contains(narrow(beyond))) {
+      const std::size_t side = n / 3 % 4;
+      expect_linear({centre, beyond, square[side], square[(side + 1) % 4]});
+    } else {
+      expect_linear({centre, square[0], square[n / 3 % 2 == 0 ? 1 : 3], square[2]});
+    }
+  }
+}
 
 TEST(BoundSignsTest, AreTheSameInLanesOfEachInstructionSet) {
   on_each_instruction_set([] {
