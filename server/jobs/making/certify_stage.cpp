@@ -1,6 +1,7 @@
 #include "server/jobs/making/certify_stage.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -74,6 +75,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   if (!summary.certificate) {
     summary.certificate.emplace().why_unproven = "A proof needs max_error_mm.";
   }
+  constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   MeshCertificate& certificate = *summary.certificate;
   for (std::size_t i = 0; i < formats.size(); ++i) {
     std::optional<codec::DecodedSurface> file;
@@ -84,7 +86,8 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
     const mesh::Certificate measured =
         mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
                       stage.part(begin, begin + part),
-                      certificate.bound_mm ? kMostPointsBesideAProof : mesh::kAllPoints);
+                      certificate.bound_mm ? kMostPointsBesideAProof : mesh::kAllPoints,
+                      certificate.bound_mm.value_or(kUnbounded));
     if (i > 0 && measured.max_mm() <= certificate.found_mm) continue;
     certificate.file = formats[i];
     certificate.found_mm = measured.max_mm();

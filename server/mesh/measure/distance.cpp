@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "server/mesh/measure/near_triangles.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
@@ -93,6 +94,23 @@ Histogram histogram_of(std::span<const float> distances, double max) {
   return histogram;
 }
 
+// The same as measure_distance, whatever `reach_mm` is.
+DistanceSummary measure_within(const SurfaceView& from, const SurfaceView& to, double reach_mm,
+                               const Context& context, std::size_t most) {
+  const Points points(from, most);
+  if (std::isfinite(reach_mm) &&
+      points.size() < (from.positions.size() + from.triangles.size()) / 4) {
+    std::vector<Point> measured;
+    measured.reserve(points.size());
+    for (std::size_t n = 0; n < points.size(); ++n) measured.push_back(points[n]);
+    const std::vector<Triangle> near = triangles_near(measured, reach_mm, to, context);
+    const DistanceSummary found =
+        measure_distance(from, TriangleGrid({to.positions, near}, context), context, most);
+    if (found.max_mm <= reach_mm) return found;
+  }
+  return measure_distance(from, TriangleGrid(to, context), context, most);
+}
+
 }  // namespace
 
 void measure_vertex_distances(const SurfaceView& from, const TriangleGrid& to,
@@ -125,13 +143,9 @@ DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to
 }
 
 Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context,
-                    std::size_t most) {
-  Certificate certificate;
-  certificate.from_mesh =
-      measure_distance(mesh, TriangleGrid(reference, context), context.part(0, 0.5), most);
-  certificate.from_reference =
-      measure_distance(reference, TriangleGrid(mesh, context), context.part(0.5, 1), most);
-  return certificate;
+                    std::size_t most, double reach_mm) {
+  return {.from_mesh = measure_within(mesh, reference, reach_mm, context.part(0, 0.5), most),
+          .from_reference = measure_within(reference, mesh, reach_mm, context.part(0.5, 1), most)};
 }
 
 }  // namespace isomesh::mesh

@@ -40,8 +40,11 @@ struct Certificate {
 };
 
 // `most`: points of each surface. Takes the memory of the larger surface's grid (triangle_grid.h)
-// and 4 bytes a point. Does not depend on the number of threads. Throws as above, and kTooLarge.
+// and 4 bytes a point. If the surfaces are within `reach_mm` of each other, few points take less
+// time: then only what is near them is looked at. The result is the same. Does not depend on the
+// number of threads. Throws as above, and kTooLarge.
 Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context,
-                    std::size_t most = kAllPoints);
+                    std::size_t most = kAllPoints,
+                    double reach_mm = std::numeric_limits<double>::infinity());
 
 }  // namespace isomesh::mesh

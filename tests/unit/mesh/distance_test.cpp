@@ -282,6 +282,17 @@ TEST(Distance, OfManyPointsIsMeasuredAtRunsOfThem) {
   EXPECT_EQ(measure_distance(from, grid, {}, all.points), all);
 }
 
+// Where the reach is too small, all is looked at.
+TEST(Distance, OfFewPointsIsTheSameWhateverTheReach) {
+  const Mesh a = ball(0.95, 60);
+  const Mesh b = ball(0.93, 55);
+  const Certificate whole = certify(a, b, {}, 1024);
+  ASSERT_GT(whole.max_mm(), 0.01);
+  for (const double reach : {1e-9, 0.01, whole.max_mm(), 0.1, 5.0}) {
+    EXPECT_EQ(certify(a, b, {}, 1024, reach), whole) << reach;
+  }
+}
+
 TEST(Distance, OfVerticesComesInTheirOrder) {
   const Mesh from = random_triangles(100, 1);
   const Mesh to = random_triangles(100, 2);
