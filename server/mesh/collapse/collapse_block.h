@@ -1,4 +1,5 @@
-// The edges of one block of triangles; private to this folder.
+// Collapses that keep T+ inside S and T- outside, in one block of triangles; private to this
+// folder.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "server/mesh/collapse/field.h"
+#include "server/mesh/collapse/patches.h"
 #include "server/mesh/collapse/tube.h"
 
 namespace isomesh::mesh::collapse {
@@ -18,13 +20,11 @@ struct CollapseSurroundings {
   double reach = 0;  // how far T+ and T- are put from T
 };
 
-// Some triangles of a tube with vertices numbered anew.
+// Some triangles of a tube.
 struct Block {
+  Patch& patch;
   std::vector<Vertex> vertices;
-  std::vector<Triangle> triangles;
-  std::vector<std::uint8_t> stays;   // of each vertex: may not change
   std::vector<std::uint8_t> planes;  // of each vertex: the faces of the volume that it stays in
-  std::vector<std::uint8_t> first;   // of each vertex: to begin with
 };
 
 // Collapses what may go until `least` triangles are left, and leaves only the triangles that

@@ -18,8 +18,10 @@ class Corners {
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   static constexpr std::size_t kMostNeighbours = 28;
 
-  Corners(std::span<const Triangle> triangles, std::size_t vertices)
-      : table_(8 * triangles.size(), kNone),
+  // Vertices with fewer neighbours than `least`, 3 or more, neither go nor gain triangles.
+  Corners(std::span<const Triangle> triangles, std::size_t vertices, std::size_t least)
+      : least_(least),
+        table_(8 * triangles.size(), kNone),
         corner_(vertices, kNone),
         is_seam_(vertices, 0),
         left_(triangles.size()) {
@@ -30,16 +32,23 @@ class Corners {
     find_seam();
   }
 
-  // How many triangles are left, and which.
   std::size_t left() const { return left_; }
-  std::vector<Triangle> triangles() const {
-    std::vector<Triangle> triangles;
-    triangles.reserve(left_);
-    for (std::size_t c = 0; c < table_.size(); c += 8) {
-      if (table_[c] != kNone) triangles.push_back({table_[c], table_[c + 1], table_[c + 2]});
+  // Takes those that are left, and of their `numbers`, if any, the same.
+  void take(std::vector<Triangle>& triangles, std::vector<std::uint32_t>& numbers) const {
+    std::size_t count = 0;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const std::size_t c = 8 * t;
+      if (table_[c] == kNone) continue;
+      triangles[count] = {table_[c], table_[c + 1], table_[c + 2]};
+      if (!numbers.empty()) numbers[count] = numbers[t];
+      ++count;
     }
-    return triangles;
+    triangles.resize(count);
+    if (!numbers.empty()) numbers.resize(count);
   }
+
+  // Elsewhere the vertex may have more triangles.
+  void put_on_seam(std::uint32_t a) { is_seam_[a] = 1; }
 
   bool is_on_seam(std::uint32_t a) const { return is_seam_[a] != 0; }
   bool is_gone(std::uint32_t a) const { return corner_[a] == kNone; }
@@ -67,9 +76,11 @@ class Corners {
       star_.push_back(c);
       c = turn(c);
     } while (c != corner_[a]);
-    return ring_.size() > 3;
+    return ring_.size() >= least_;
   }
   const std::vector<std::uint32_t>& ring() const { return ring_; }
+  // The number of the triangle between ring()[k] and the next.
+  std::uint32_t triangle_behind(std::size_t k) const { return star_[k] / 8; }
 
   // Link condition: true if the vertex that was walked around may become ring()[k]. No new edge may
   // exist already, and none may join two vertices of the seam.
@@ -80,19 +91,20 @@ class Corners {
     const auto is_other = [&](std::uint32_t x) { return x != b && x != left && x != right; };
     bool joins = false;
     if (!is_on_seam(b)) {
-      int degree = 0;
+      std::size_t degree = 0;
       visit_neighbours(b, [&](std::uint32_t x) {
         ++degree;
         joins = joins || (is_other(x) && std::ranges::find(ring_, x) != ring_.end());
       });
-      return !joins && degree > 3;
+      return !joins && degree >= least_ && degree + ring_.size() > 6;
     }
     for (const std::uint32_t r : ring_) {
       if (!is_other(r)) continue;
       if (is_on_seam(r)) return false;
       visit_neighbours(r, [&](std::uint32_t x) { joins = joins || x == b; });
     }
-    return !joins;
+    // The three neighbours may have a triangle already, which only a fan of their own can tell.
+    return !joins && (ring_.size() > 3 || has_more_than_three(left) || has_more_than_three(right));
   }
 
   // The vertices around the one that was walked around and ring()[k], in order: first the others of
@@ -146,6 +158,12 @@ class Corners {
   std::size_t before(std::size_t k) const { return k == 0 ? ring_.size() - 1 : k - 1; }
   std::size_t after(std::size_t k) const { return k + 1 == ring_.size() ? 0 : k + 1; }
 
+  bool has_more_than_three(std::uint32_t a) const {
+    std::size_t degree = 0;
+    if (!is_on_seam(a)) visit_neighbours(a, [&](std::uint32_t) { ++degree; });
+    return degree > 3;
+  }
+
   void pair(std::uint32_t c, std::uint32_t d) {
     if (c != kNone) table_[c + 4] = d;
     if (d != kNone) table_[d + 4] = c;
@@ -189,6 +207,7 @@ class Corners {
     }
   }
 
+  const std::size_t least_;
   std::vector<std::uint32_t> table_;
   std::vector<std::uint32_t> corner_;  // by vertex: one of its corners
   std::vector<std::uint8_t> is_seam_;  // by vertex

@@ -1,11 +1,10 @@
 // Fewer triangles for a surface, within a distance of it that is measured.
 //
-// libmeshoptimizer proposes which edges to collapse. It removes vertices but never moves them. Its
-// error is a quadric's (M. Garland, P. S. Heckbert, "Surface simplification using quadric error
-// metrics", SIGGRAPH 1997), not a distance. So each proposal is measured against the original
-// surface in both directions, and its topology is checked. If it is too far off or not a manifold,
-// its vertices are held and a new proposal is made. After several attempts the new proposals reduce
-// less.
+// Edges collapse in the order of their quadrics (M. Garland, P. S. Heckbert, "Surface
+// simplification using quadric error metrics", SIGGRAPH 1997). A vertex is drawn into a neighbour,
+// so vertices are removed but never moved. A quadric is no distance. So before each collapse its
+// place is measured against the original surface in both directions, and the link condition is
+// checked.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +24,7 @@ struct SimplifyOptions {
   // The vertex positions before they were moved, in the mesh's order. The error is measured from
   // that surface. Empty: the current positions. No vertex may have moved farther than the error.
   std::span<const Vec3> before = {};
-  // Target triangle count, spread evenly over the blocks. 0: as few as the error allows.
+  // Target triangle count. 0: as few as the error allows.
   std::uint64_t triangles = 0;
   // A flag for each vertex of the mesh: it stays, on junction curves too. Empty: any may go.
   std::span<const std::uint8_t> held = {};
@@ -34,11 +33,7 @@ struct SimplifyOptions {
 struct SimplificationEffect {
   std::uint64_t triangles_before = 0;
   std::uint64_t triangles_after = 0;
-  // Blocks of triangles that were simplified in all rounds, how many proposals for them were made
-  // again, and how many of them were left as they were in the end.
-  std::uint64_t blocks = 0;
-  std::uint64_t repeated = 0;
-  std::uint64_t taken_back = 0;
+  std::uint64_t blocks = 0;  // of triangles that were simplified together, in all rounds
   // True if the target count was reached, or if there was none.
   bool reached_triangles = true;
   // True if the target was not reached because no further edge can collapse, whatever the error.

@@ -6,47 +6,58 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <queue>
 #include <utility>
 #include <vector>
 
-#include "server/mesh/collapse/edge_collapses.h"
 #include "server/mesh/measure/point_triangle.h"
+#include "server/mesh/points.h"
 
-namespace isomesh::mesh {
+namespace isomesh::mesh::collapse {
 namespace {
 
-class LineSimplifier : private EdgeCollapses {
+// The first request, as a share of the bound: the walls' own distance adds to that of lines.
+constexpr double kLineError = 0.5;
+
+constexpr double kLeastCosine = 0.25;  // between a triangle's normals before and after
+
+using mesh::dot;
+using Numbers = std::vector<std::uint32_t>;
+
+bool has(std::span<const std::uint32_t> numbers, std::uint32_t number) {
+  return std::ranges::find(numbers, number) != numbers.end();
+}
+
+class LineSimplifier {
  public:
-  LineSimplifier(const BlockGoal& goal, std::span<const std::uint8_t> is_free, SurfaceBlock& block)
-      : EdgeCollapses(goal.mesh, block.triangles),
-        goal_(goal),
-        block_(block),
-        squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),
-        squared_line_bound_(std::pow(kFirstError * goal.max_error_mm, 2)),
-        points_(mesh_.triangles.size()),
-        on_line_beside_(mesh_.origin.size()),
-        version_(mesh_.origin.size(), 0) {
-    for (std::uint32_t n = 0; n < block.homes.size(); ++n) points_[block.homes[n]].push_back(n);
+  LineSimplifier(const SimplifySurroundings& around, std::span<const WallSides> sides, Patch& patch)
+      : around_(around),
+        sides_(sides),
+        patch_(patch),
+        squared_bound_(std::pow(kLineError * around.max_error_mm, 2)),
+        is_gone_(patch.triangles.size(), false),
+        around_vertex_(patch.names.size()),
+        on_line_beside_(patch.names.size()),
+        is_at_end_(patch.names.size(), false),
+        version_(patch.names.size(), 0) {
+    for (std::uint32_t t = 0; t < patch.triangles.size(); ++t) {
+      for (const std::uint32_t vertex : patch.triangles[t]) around_vertex_[vertex].push_back(t);
+    }
     find_lines();
-    is_free_.resize(mesh_.origin.size());
-    for (std::size_t v = 0; v < is_free_.size(); ++v) {
-      const std::uint32_t vertex = mesh_.origin[v];
-      is_free_[v] = is_free[vertex] != 0 && goal.mesh.is_on_line(vertex) && !is_at_end_[v] &&
-                    !goal.holds(vertex);
+    for (std::size_t v = 0; v < patch.names.size(); ++v) {
+      is_free_.push_back(patch.stays[v] == 0 && around.mesh.is_on_line(patch.names[v]) &&
+                         !is_at_end_[v]);
     }
   }
 
-  void run() {
+  void run(double share) {
     std::size_t left = 0;
     for (std::uint32_t v = 0; v < is_free_.size(); ++v) {
       if (!is_within_line(v)) continue;
       ++left;
       put_in_queue(v);
     }
-    const auto wanted =
-        static_cast<std::size_t>(std::sqrt(goal_.share) * static_cast<double>(left));
+    const auto wanted = static_cast<std::size_t>(std::sqrt(share) * static_cast<double>(left));
     while (!queue_.empty() && left > wanted) {
       const Candidate next = queue_.top();
       queue_.pop();
@@ -74,11 +85,10 @@ class LineSimplifier : private EdgeCollapses {
   // Finds the edges of junction curves and of the surface's ends: all that do not have exactly two
   // triangles of one wall.
   void find_lines() {
-    is_at_end_.assign(mesh_.origin.size(), false);
     std::vector<std::pair<Edge, std::uint32_t>> edges;
-    edges.reserve(3 * mesh_.triangles.size());
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-      const auto& [a, b, c] = mesh_.triangles[t];
+    edges.reserve(3 * patch_.triangles.size());
+    for (std::uint32_t t = 0; t < patch_.triangles.size(); ++t) {
+      const auto& [a, b, c] = patch_.triangles[t];
       for (const Edge& side : {edge(a, b), edge(b, c), edge(c, a)}) edges.emplace_back(side, t);
     }
     std::ranges::sort(edges);
@@ -86,8 +96,8 @@ class LineSimplifier : private EdgeCollapses {
       std::size_t end = begin;
       while (end < edges.size() && edges[end].first == edges[begin].first) ++end;
       const auto [a, b] = edges[begin].first;
-      const bool is_within_wall = end - begin == 2 && block_.sides[edges[begin].second] ==
-                                                          block_.sides[edges[begin + 1].second];
+      const bool is_within_wall =
+          end - begin == 2 && sides_of(edges[begin].second) == sides_of(edges[begin + 1].second);
       if (!is_within_wall) {
         on_line_beside_[a].push_back(b);
         on_line_beside_[b].push_back(a);
@@ -104,44 +114,43 @@ class LineSimplifier : private EdgeCollapses {
     const std::uint32_t from = on_line_beside_[v][0];
     const std::uint32_t to = on_line_beside_[v][1];
     std::size_t seen = 0;
-    for (const std::uint32_t first : around_[v]) {
-      if (!has(mesh_.triangles[first], from)) continue;
+    for (const std::uint32_t first : around_vertex_[v]) {
+      if (!has(patch_.triangles[first], from)) continue;
       std::uint32_t at = from;
       std::uint32_t triangle = first;
-      for (std::size_t steps = 0; steps <= around_[v].size(); ++steps) {
+      for (std::size_t steps = 0; steps <= around_vertex_[v].size(); ++steps) {
         ++seen;
         at = third(triangle, v, at);
         if (at == to) break;
-        const auto next = std::ranges::find_if(around_[v], [&](std::uint32_t t) {
-          return t != triangle && has(mesh_.triangles[t], at);
+        const auto next = std::ranges::find_if(around_vertex_[v], [&](std::uint32_t t) {
+          return t != triangle && has(patch_.triangles[t], at);
         });
-        if (at == from || next == around_[v].end()) return false;
+        if (at == from || next == around_vertex_[v].end()) return false;
         triangle = *next;
       }
     }
-    return seen == around_[v].size();
+    return seen == around_vertex_[v].size();
   }
 
   void put_in_queue(std::uint32_t v) {
     const Edge beside = edge(on_line_beside_[v][0], on_line_beside_[v][1]);
-    const Corners segment = {mesh_.at(beside.first), mesh_.at(beside.second),
-                             mesh_.at(beside.second)};
-    double farthest = squared_distance(mesh_.at(v), segment);
+    const mesh::Corners segment = {at(beside.first), at(beside.second), at(beside.second)};
+    double farthest = squared_distance(at(v), segment);
     for (const std::uint32_t end : on_line_beside_[v]) {
       const auto passed = passed_.find(edge(v, end));
       if (passed == passed_.end()) continue;
       for (const std::uint32_t vertex : passed->second) {
-        farthest = std::max(farthest, squared_distance(mesh_.at(vertex), segment));
+        farthest = std::max(farthest, squared_distance(at(vertex), segment));
       }
     }
-    if (farthest <= squared_line_bound_) queue_.push({farthest, v, version_[v]});
+    if (farthest <= squared_bound_) queue_.push({farthest, v, version_[v]});
   }
 
   // Into the nearer of its neighbours on the line, or the other one.
   bool collapse(std::uint32_t v) {
     std::array<std::uint32_t, 2> ends = {on_line_beside_[v][0], on_line_beside_[v][1]};
     const auto length = [&](std::uint32_t end) {
-      const Point along = minus(mesh_.at(end), mesh_.at(v));
+      const Point along = minus(at(end), at(v));
       return std::pair(dot(along, along), end);
     };
     if (length(ends[1]) < length(ends[0])) std::swap(ends[0], ends[1]);
@@ -152,58 +161,95 @@ class LineSimplifier : private EdgeCollapses {
     const auto [gone, kept] = split_star(v, into);
     if (has(on_line_beside_[into], beyond) || !links_meet_at_edge(v, into, gone)) return false;
     if (!stays_upright(v, into, kept)) return false;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> moves;
-    if (goal_.grid != nullptr && !stays_near(v, into, gone, kept, moves)) return false;
+    if (around_.points != nullptr && !stays_near(v, into, gone, kept)) return false;
     move(v, into, beyond, gone, kept);
-    for (const auto& [n, t] : moves) points_[t].push_back(n);
     return true;
   }
 
-  // True if the remaining triangles are near the original, and each point of the vertex's triangles
-  // is near a remaining one of the same wall. Adds each point and its new triangle to `moves`.
-  bool stays_near(std::uint32_t v, std::uint32_t into, const Numbers& gone, const Numbers& kept,
-                  std::vector<std::pair<std::uint32_t, std::uint32_t>>& moves) {
-    std::uint32_t guess = TriangleGrid::kNone;
-    std::vector<Corners> shapes;
+  bool stays_near(std::uint32_t v, std::uint32_t into, const Numbers& gone, const Numbers& kept) {
+    Numbers star;
+    std::vector<KeptPoints::Shape> shapes;
+    for (const std::uint32_t t : gone) star.push_back(patch_.numbers[t]);
     for (const std::uint32_t t : kept) {
-      const auto [a, b, c] = moved(t, v, into);
-      const Corners& shape = shapes.emplace_back(Corners{mesh_.at(a), mesh_.at(b), mesh_.at(c)});
-      Point centre;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        centre[axis] = (shape[0][axis] + shape[1][axis] + shape[2][axis]) / 3;
-      }
-      guess = goal_.grid->within(centre, squared_bound_, guess).triangle;
-      if (guess == TriangleGrid::kNone) return false;
+      star.push_back(patch_.numbers[t]);
+      shapes.push_back({star.back(), corners_of(moved(t, v, into))});
     }
-    for (const Numbers* triangles : {&gone, &kept}) {
-      for (const std::uint32_t t : *triangles) {
-        for (const std::uint32_t n : points_[t]) {
-          const std::optional<std::uint32_t> home = home_of(n, block_.sides[t], kept, shapes);
-          if (!home) return false;
-          moves.emplace_back(n, *home);
-        }
-      }
-    }
-    for (const std::uint32_t t : kept) points_[t].clear();
-    return true;
+    return around_.points->replace(star, shapes);
   }
 
-  // A triangle of the wall that is near the point.
-  std::optional<std::uint32_t> home_of(std::uint32_t point, const WallSides& sides,
-                                       const Numbers& kept,
-                                       const std::vector<Corners>& shapes) const {
-    const Point at = measured_point(goal_.original, block_.points[point]);
-    for (std::size_t n = 0; n < kept.size(); ++n) {
-      if (block_.sides[kept[n]] != sides) continue;
-      if (squared_distance(at, shapes[n]) <= squared_bound_) return kept[n];
+  // The triangles around a vertex that a collapse takes away, and those that it leaves.
+  std::pair<Numbers, Numbers> split_star(std::uint32_t v, std::uint32_t into) const {
+    std::pair<Numbers, Numbers> star;
+    for (const std::uint32_t t : around_vertex_[v]) {
+      (has(patch_.triangles[t], into) ? star.first : star.second).push_back(t);
     }
-    return std::nullopt;
+    return star;
+  }
+
+  std::uint32_t third(std::uint32_t triangle, std::uint32_t a, std::uint32_t b) const {
+    const auto& corners = patch_.triangles[triangle];
+    return *std::ranges::find_if(corners, [&](std::uint32_t c) { return c != a && c != b; });
+  }
+
+  bool are_neighbours(std::uint32_t a, std::uint32_t b) const {
+    if (around_vertex_[b].size() < around_vertex_[a].size()) std::swap(a, b);
+    return std::ranges::any_of(around_vertex_[a],
+                               [&](std::uint32_t t) { return has(patch_.triangles[t], b); });
+  }
+
+  Numbers neighbours(std::uint32_t v) const {
+    Numbers found;
+    for (const std::uint32_t t : around_vertex_[v]) {
+      for (const std::uint32_t vertex : patch_.triangles[t]) {
+        if (vertex != v) found.push_back(vertex);
+      }
+    }
+    std::ranges::sort(found);
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  }
+
+  bool links_meet_at_edge(std::uint32_t v, std::uint32_t into, const Numbers& gone) const {
+    Numbers apexes;
+    for (const std::uint32_t t : gone) apexes.push_back(third(t, v, into));
+    std::ranges::sort(apexes);
+    if (std::ranges::adjacent_find(apexes) != apexes.end()) return false;
+    const auto is_beside_both = [&](std::uint32_t vertex) {
+      return vertex != into && !std::ranges::binary_search(apexes, vertex) &&
+             are_neighbours(vertex, into);
+    };
+    if (std::ranges::any_of(neighbours(v), is_beside_both)) return false;
+    return std::ranges::none_of(around_vertex_[v], [&](std::uint32_t t) {
+      return std::ranges::all_of(patch_.triangles[t], [&](std::uint32_t vertex) {
+        return vertex == v || std::ranges::binary_search(apexes, vertex);
+      });
+    });
+  }
+
+  Triangle moved(std::uint32_t triangle, std::uint32_t v, std::uint32_t into) const {
+    Triangle corners = patch_.triangles[triangle];
+    std::ranges::replace(corners, v, into);
+    return corners;
+  }
+
+  bool stays_upright(std::uint32_t v, std::uint32_t into, const Numbers& kept) const {
+    return std::ranges::all_of(kept, [&](std::uint32_t t) {
+      const Point before = normal(patch_.triangles[t]);
+      const Point after = normal(moved(t, v, into));
+      const double lengths = std::sqrt(dot(before, before) * dot(after, after));
+      return lengths > 0 && dot(before, after) > kLeastCosine * lengths;
+    });
   }
 
   void move(std::uint32_t v, std::uint32_t into, std::uint32_t beyond, const Numbers& gone,
             const Numbers& kept) {
-    for (const std::uint32_t t : gone) points_[t].clear();
-    collapse_edge(v, into, gone, kept);
+    for (const std::uint32_t t : gone) {
+      is_gone_[t] = true;
+      for (const std::uint32_t vertex : patch_.triangles[t]) std::erase(around_vertex_[vertex], t);
+    }
+    for (const std::uint32_t t : kept) patch_.triangles[t] = moved(t, v, into);
+    around_vertex_[into].insert(around_vertex_[into].end(), kept.begin(), kept.end());
+    around_vertex_[v].clear();
     Numbers& passed = passed_[edge(into, beyond)];
     for (const std::uint32_t end : {into, beyond}) {
       const auto before = passed_.find(edge(v, end));
@@ -222,27 +268,34 @@ class LineSimplifier : private EdgeCollapses {
     }
   }
 
-  // Puts what is left into the block.
+  // Leaves what is left in the patch.
   void take() {
-    SurfaceBlock left;
-    left.points.swap(block_.points);
-    left.homes.assign(left.points.size(), 0);
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+    std::size_t count = 0;
+    for (std::uint32_t t = 0; t < patch_.triangles.size(); ++t) {
       if (is_gone_[t]) continue;
-      for (const std::uint32_t n : points_[t]) {
-        left.homes[n] = static_cast<std::uint32_t>(left.triangles.size());
-      }
-      left.triangles.push_back(mesh_.in_mesh(mesh_.triangles[t]));
-      left.sides.push_back(block_.sides[t]);
+      patch_.triangles[count] = patch_.triangles[t];
+      patch_.numbers[count] = patch_.numbers[t];
+      ++count;
     }
-    block_ = std::move(left);
+    patch_.triangles.resize(count);
+    patch_.numbers.resize(count);
   }
 
-  const BlockGoal& goal_;
-  SurfaceBlock& block_;
+  const WallSides& sides_of(std::uint32_t t) const { return sides_[patch_.numbers[t]]; }
+  Point at(std::uint32_t v) const { return to_point(around_.mesh.positions[patch_.names[v]]); }
+  mesh::Corners corners_of(const Triangle& triangle) const {
+    return {at(triangle[0]), at(triangle[1]), at(triangle[2])};
+  }
+  Point normal(const Triangle& triangle) const {
+    return normal_of(at(triangle[0]), at(triangle[1]), at(triangle[2]));
+  }
+
+  const SimplifySurroundings& around_;
+  const std::span<const WallSides> sides_;
+  Patch& patch_;
   const double squared_bound_;
-  const double squared_line_bound_;
-  std::vector<Numbers> points_;          // of each triangle, by their places in the block
+  std::vector<bool> is_gone_;            // of triangles
+  std::vector<Numbers> around_vertex_;   // triangles of each vertex
   std::vector<Numbers> on_line_beside_;  // of each vertex its neighbours along lines
   std::vector<bool> is_at_end_;          // whether a surface ends at the vertex
   std::vector<bool> is_free_;
@@ -253,9 +306,9 @@ class LineSimplifier : private EdgeCollapses {
 
 }  // namespace
 
-void simplify_lines(const BlockGoal& goal, std::span<const std::uint8_t> is_free,
-                    SurfaceBlock& block) {
-  if (!block.triangles.empty()) LineSimplifier(goal, is_free, block).run();
+void simplify_lines(const SimplifySurroundings& around, std::span<const WallSides> sides,
+                    double share, Patch& patch) {
+  LineSimplifier(around, sides, patch).run(share);
 }
 
-}  // namespace isomesh::mesh
+}  // namespace isomesh::mesh::collapse
