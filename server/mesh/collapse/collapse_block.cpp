@@ -179,7 +179,7 @@ void collapse_five(const CollapseSurroundings& around, std::size_t least, Block&
 }
 
 void collapse_bcc(const CollapseSurroundings& around, std::size_t least, Block& block) {
-  Collapser<SlowClear<BccPlanes>>(around, block).run(least);
+  Prover<SlowClear<BccPlanes>>(around, block).run(least);
 }
 
 }  // namespace isomesh::mesh::collapse::HWY_NAMESPACE

@@ -39,7 +39,7 @@ double radius_around(const Point& centre, const Corners& piece) {
 // Looks at one triangle after the other. Not thread safe.
 class Searcher {
  public:
-  Searcher(const WallGrids& from, const WallGrids& to, double within_mm)
+  Searcher(const WalledSurface& from, const WallGrids& to, double within_mm)
       : from_(from),
         to_(to),
         within_(within_mm * (1 - kRounding)),
@@ -47,8 +47,8 @@ class Searcher {
         guesses_(to.walls(), TriangleGrid::kNone) {}
 
   std::optional<Miss> look_at(std::uint32_t triangle) {
-    const Corners corners = corners_of(from_.surface(), triangle);
-    const std::size_t wall = to_.find(from_.sides(from_.wall_of(triangle)));
+    const Corners corners = corners_of(from_.view, triangle);
+    const std::size_t wall = to_.find(from_.sides_of(triangle));
     if (wall == WallGrids::kNone) return Miss{triangle, centre_of(corners)};
     grid_ = &to_.grid(wall);
     guess_ = guesses_[wall];
@@ -89,7 +89,7 @@ class Searcher {
     });
   }
 
-  const WallGrids& from_;
+  const WalledSurface& from_;
   const WallGrids& to_;
   const double within_;
   const double squared_within_;
@@ -102,27 +102,24 @@ class Searcher {
 
 }  // namespace
 
-WallGrids::WallGrids(const SurfaceView& surface, std::span<const WallSides> sides,
-                     const Context& context)
-    : surface_(surface), wall_of_(surface.triangles.size(), 0), members_(surface.triangles.size()) {
-  std::iota(members_.begin(), members_.end(), 0U);
-  const auto key = [&](std::uint32_t t) { return sides.empty() ? 0 : key_of(sides[t]); };
-  if (!sides.empty()) std::ranges::stable_sort(members_, {}, key);
-  triangles_.reserve(members_.size());
-  for (std::size_t n = 0; n < members_.size(); ++n) {
-    const std::uint32_t t = members_[n];
-    if (n == 0 || key(t) != key(members_[n - 1])) {
-      begins_.push_back(n);
-      sides_.push_back(sides.empty() ? WallSides{} : sides[t]);
+WallGrids::WallGrids(const WalledSurface& surface, const Context& context) {
+  std::vector<std::uint32_t> order(surface.view.triangles.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto key = [&](std::uint32_t t) { return key_of(surface.sides_of(t)); };
+  if (!surface.sides.empty()) std::ranges::stable_sort(order, {}, key);
+  std::vector<std::size_t> begins;
+  triangles_.reserve(order.size());
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    if (n == 0 || key(order[n]) != key(order[n - 1])) {
+      begins.push_back(n);
+      sides_.push_back(surface.sides_of(order[n]));
     }
-    wall_of_[t] = static_cast<std::uint32_t>(sides_.size() - 1);
-    triangles_.push_back(surface.triangles[t]);
+    triangles_.push_back(surface.view.triangles[order[n]]);
   }
-  begins_.push_back(members_.size());
+  begins.push_back(order.size());
   for (std::size_t wall = 0; wall < sides_.size(); ++wall) {
-    const auto its =
-        std::span(triangles_).subspan(begins_[wall], begins_[wall + 1] - begins_[wall]);
-    grids_.emplace_back(SurfaceView(surface.positions, its), context);
+    const auto its = std::span(triangles_).subspan(begins[wall], begins[wall + 1] - begins[wall]);
+    grids_.emplace_back(SurfaceView(surface.view.positions, its), context);
   }
 }
 
@@ -132,20 +129,17 @@ std::size_t WallGrids::find(const WallSides& sides) const {
   return static_cast<std::size_t>(found - sides_.begin());
 }
 
-std::vector<Miss> find_misses(const WallGrids& from, const WallGrids& to, double within_mm,
-                              const Context& context) {
+std::vector<Miss> find_misses(const WalledSurface& from, std::span<const std::uint32_t> which,
+                              const WallGrids& to, double within_mm, const Context& context) {
   constexpr std::size_t kPerTask = 2048;
-  const std::size_t count = from.surface().triangles.size();
-  std::vector<std::vector<Miss>> found(chunks_of(count, kPerTask));
+  std::vector<std::vector<Miss>> found(chunks_of(which.size(), kPerTask));
   const auto look = [&](std::size_t begin, std::size_t end) {
     Searcher searcher(from, to, within_mm);
-    for (std::size_t t = begin; t < end; ++t) {
-      if (const auto miss = searcher.look_at(static_cast<std::uint32_t>(t))) {
-        found[begin / kPerTask].push_back(*miss);
-      }
+    for (const std::uint32_t t : which.subspan(begin, end - begin)) {
+      if (const auto miss = searcher.look_at(t)) found[begin / kPerTask].push_back(*miss);
     }
   };
-  for_chunks(context, count, look, kPerTask);
+  for_chunks(context, which.size(), look, kPerTask);
   std::vector<Miss> misses;
   for (const auto& part : found) misses.insert(misses.end(), part.begin(), part.end());
   return misses;

@@ -20,37 +20,34 @@
 
 namespace isomesh::mesh {
 
-// The triangles of a surface by the wall that they belong to, with an index of each wall. The
-// view's arrays and the sides must outlive it. Immutable, so safe to read from several threads.
+struct WalledSurface {
+  SurfaceView view;
+  std::span<const WallSides> sides;  // of each triangle; empty if all are of one wall
+
+  WallSides sides_of(std::size_t triangle) const {
+    return sides.empty() ? WallSides{} : sides[triangle];
+  }
+};
+
+// An index of each wall's triangles. Positions must outlive it. Immutable, so safe to read from
+// several threads.
 class WallGrids {
  public:
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-  // `sides`: of each triangle; if it is empty, all are of one wall. Throws as TriangleGrid.
-  WallGrids(const SurfaceView& surface, std::span<const WallSides> sides, const Context& context);
+  // Throws as TriangleGrid.
+  WallGrids(const WalledSurface& surface, const Context& context);
   WallGrids(const WallGrids&) = delete;
 
-  const SurfaceView& surface() const { return surface_; }
   std::size_t walls() const { return sides_.size(); }
-  std::size_t wall_of(std::uint32_t triangle) const { return wall_of_[triangle]; }
-  WallSides sides(std::size_t wall) const { return sides_[wall]; }
-  // kNone if the surface has no such wall.
+  // The number of a wall; kNone if the surface has no such wall.
   std::size_t find(const WallSides& sides) const;
-
   const TriangleGrid& grid(std::size_t wall) const { return grids_[wall]; }
-  // The surface's number of a triangle of grid(wall).
-  std::uint32_t triangle_of(std::size_t wall, std::uint32_t in_grid) const {
-    return members_[begins_[wall] + in_grid];
-  }
 
  private:
-  const SurfaceView surface_;
-  std::vector<WallSides> sides_;        // of each wall, in ascending order
-  std::vector<std::uint32_t> wall_of_;  // by triangle
-  std::vector<std::size_t> begins_;     // of each wall's in `members_`, and the end
-  std::vector<std::uint32_t> members_;  // numbers of triangles
-  std::vector<Triangle> triangles_;     // the same ones
-  std::deque<TriangleGrid> grids_;      // of each wall
+  std::vector<WallSides> sides_;     // of each wall, in ascending order
+  std::vector<Triangle> triangles_;  // of one wall after the other
+  std::deque<TriangleGrid> grids_;
 };
 
 struct Miss {
@@ -58,11 +55,11 @@ struct Miss {
   Point place = {0, 0, 0};  // in it: the farthest that was found
 };
 
-// The triangles of `from` with a place that is farther than `within_mm`, which is more than 0, from
-// the same wall of `to`; and those for which pieces of a thousandth of the distance do not tell. So
-// if there are none, all places are near enough. In ascending order, for any number of threads.
-// Throws Error kCancelled.
-std::vector<Miss> find_misses(const WallGrids& from, const WallGrids& to, double within_mm,
-                              const Context& context);
+// Of the triangles `which` of `from`, in their order, those with a place that is farther than
+// `within_mm`, which is more than 0, from the same wall of `to`; and those for which pieces of a
+// thousandth of the distance do not tell. So if there are none, all places are near enough. The
+// same for any number of threads. Throws Error kCancelled.
+std::vector<Miss> find_misses(const WalledSurface& from, std::span<const std::uint32_t> which,
+                              const WallGrids& to, double within_mm, const Context& context);
 
 }  // namespace isomesh::mesh

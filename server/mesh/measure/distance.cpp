@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "server/mesh/measure/near_triangles.h"
+#include "server/mesh/measure/marked_cubes.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
@@ -97,13 +97,18 @@ Histogram histogram_of(std::span<const float> distances, double max) {
 // The same as measure_distance, whatever `reach_mm` is.
 DistanceSummary measure_within(const SurfaceView& from, const SurfaceView& to, double reach_mm,
                                const Context& context, std::size_t most) {
+  constexpr std::size_t kFew = 4;  // one point in so many, or fewer
   const Points points(from, most);
-  if (std::isfinite(reach_mm) &&
-      points.size() < (from.positions.size() + from.triangles.size()) / 4) {
-    std::vector<Point> measured;
-    measured.reserve(points.size());
-    for (std::size_t n = 0; n < points.size(); ++n) measured.push_back(points[n]);
-    const std::vector<Triangle> near = triangles_near(measured, reach_mm, to, context);
+  const std::size_t all = from.positions.size() + from.triangles.size();
+  if (std::isfinite(reach_mm) && points.size() < all / kFew) {
+    std::vector<Box> places;
+    places.reserve(points.size());
+    for (std::size_t n = 0; n < points.size(); ++n) places.push_back({points[n], points[n]});
+    const MarkedCubes cubes(places, reach_mm);
+    std::vector<Triangle> near;
+    for (const Triangle& triangle : to.triangles) {
+      if (cubes.are_near(box_of(to, triangle))) near.push_back(triangle);
+    }
     const DistanceSummary found =
         measure_distance(from, TriangleGrid({to.positions, near}, context), context, most);
     if (found.max_mm <= reach_mm) return found;

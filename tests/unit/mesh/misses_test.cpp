@@ -22,11 +22,12 @@ struct Surface {
   std::vector<Triangle> triangles;
   std::vector<WallSides> sides = {};
 
-  SurfaceView view() const { return {positions, triangles}; }
+  WalledSurface walled() const { return {{positions, triangles}, sides}; }
 };
 
 std::vector<Miss> misses(const Surface& from, const Surface& to, double within_mm) {
-  return find_misses({from.view(), from.sides, {}}, {to.view(), to.sides, {}}, within_mm, {});
+  const auto all = consecutive<std::uint32_t>(0, from.triangles.size());
+  return find_misses(from.walled(), all, {to.walled(), {}}, within_mm, {});
 }
 
 // A square between its corners, at a height, cut into so many by so many squares of two triangles.
