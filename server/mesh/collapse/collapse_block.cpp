@@ -62,6 +62,7 @@ class Prover : private Collapser<Prover<Test>> {
   static constexpr int kBuckets = 64;
   static constexpr std::size_t kTries = 2;
   static constexpr std::size_t kLeastNeighbours = 4;
+  static constexpr std::size_t kMostNeighbours = Corners::kMostNeighbours;
   static constexpr bool kInOrder = false;
   static constexpr bool kMovesTheOther = true;
 

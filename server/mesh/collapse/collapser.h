@@ -21,7 +21,7 @@ namespace isomesh::mesh::collapse {
 // `Own` derives from it and decides which edges may go:
 //   kBuckets            of costs; edges of more stay
 //   kTries              edges of a vertex that are tried
-//   kLeastNeighbours    of vertices that take part
+//   kLeastNeighbours    of vertices that take part, and kMostNeighbours of those that go
 //   kInOrder            an edge waits for its bucket even if a better one of its vertex may not go
 //   kMovesTheOther      the end that is left need not stay in its place
 //   int bucket_of(float cost, float weight) const
@@ -38,7 +38,8 @@ class Collapser {
   };
 
   Collapser(std::span<const Triangle> triangles, std::size_t vertices)
-      : corners_(triangles, vertices, Own::kLeastNeighbours), queue_(Own::kBuckets) {
+      : corners_(triangles, vertices, Own::kLeastNeighbours, Own::kMostNeighbours),
+        queue_(Own::kBuckets) {
     nodes_.reserve(vertices);
   }
 
@@ -122,7 +123,7 @@ class Collapser {
   void try_vertex(std::uint32_t a, int bucket) {
     if (!corners_.walk_around(a)) return;
     const std::vector<std::uint32_t>& ring = corners_.ring();
-    std::array<std::pair<float, std::size_t>, Corners::kMostNeighbours> order;
+    std::array<std::pair<float, std::size_t>, Own::kMostNeighbours> order;
     for (std::size_t k = 0; k < ring.size(); ++k) order[k] = {cost(a, ring[k]), k};
     for (std::size_t k = 0; k < std::min(Own::kTries, ring.size()); ++k) {
       const auto least = std::min_element(order.begin() + k, order.begin() + ring.size());

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "server/mesh/mesh.h"
@@ -16,11 +18,14 @@ namespace isomesh::mesh::collapse {
 class Corners {
  public:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  static constexpr std::size_t kMostNeighbours = 28;
+  static constexpr std::size_t kMostNeighbours = 28;  // that a loop takes
 
-  // Vertices with fewer neighbours than `least`, 3 or more, neither go nor gain triangles.
-  Corners(std::span<const Triangle> triangles, std::size_t vertices, std::size_t least)
+  // Vertices with fewer neighbours than `least`, 3 or more, neither go nor gain triangles; those
+  // with more than `most` do not go.
+  Corners(std::span<const Triangle> triangles, std::size_t vertices, std::size_t least,
+          std::size_t most)
       : least_(least),
+        most_(most),
         table_(8 * triangles.size(), kNone),
         corner_(vertices, kNone),
         is_seam_(vertices, 0),
@@ -47,8 +52,13 @@ class Corners {
     if (!numbers.empty()) numbers.resize(count);
   }
 
-  // Elsewhere the vertex may have more triangles.
   void put_on_seam(std::uint32_t a) { is_seam_[a] = 1; }
+  // An edge between two vertices of the seam may come if all triangles of one of them are here,
+  // which these flags tell.
+  void set_whole(std::vector<std::uint8_t> is_whole) {
+    is_whole_ = std::move(is_whole);
+    visit_corners([&](std::uint32_t c) { note_edge(at(next(c)), at(previous(c))); });
+  }
 
   bool is_on_seam(std::uint32_t a) const { return is_seam_[a] != 0; }
   bool is_gone(std::uint32_t a) const { return corner_[a] == kNone; }
@@ -71,7 +81,7 @@ class Corners {
     star_.clear();
     std::uint32_t c = corner_[a];
     do {
-      if (star_.size() == kMostNeighbours) return false;
+      if (star_.size() == most_) return false;
       ring_.push_back(at(next(c)));
       star_.push_back(c);
       c = turn(c);
@@ -83,7 +93,7 @@ class Corners {
   std::uint32_t triangle_behind(std::size_t k) const { return star_[k] / 8; }
 
   // Link condition: true if the vertex that was walked around may become ring()[k]. No new edge may
-  // exist already, and none may join two vertices of the seam.
+  // exist already, and of the seam only vertices are joined of which that is known.
   bool keeps_topology(std::size_t k) const {
     const std::uint32_t b = ring_[k];
     const std::uint32_t left = ring_[before(k)];
@@ -100,7 +110,10 @@ class Corners {
     }
     for (const std::uint32_t r : ring_) {
       if (!is_other(r)) continue;
-      if (is_on_seam(r)) return false;
+      if (is_on_seam(r)) {
+        if (!may_join_on_seam(r, b)) return false;
+        continue;
+      }
       visit_neighbours(r, [&](std::uint32_t x) { joins = joins || x == b; });
     }
     // The three neighbours may have a triangle already, which only a fan of their own can tell.
@@ -131,6 +144,7 @@ class Corners {
     const std::uint32_t last = star_[before(k)];  // of the triangle a, before, b
     const std::uint32_t second = star_[after(k)];
     corner_[at(first)] = kNone;
+    for (const std::uint32_t r : ring_) note_edge(r, b);
     pair(opposite(first), opposite(next(first)));
     pair(opposite(last), opposite(previous(last)));
     for (const std::uint32_t c : star_) table_[c] = b;
@@ -157,6 +171,19 @@ class Corners {
   std::uint32_t turn(std::uint32_t corner) const { return next(opposite(next(corner))); }
   std::size_t before(std::size_t k) const { return k == 0 ? ring_.size() - 1 : k - 1; }
   std::size_t after(std::size_t k) const { return k + 1 == ring_.size() ? 0 : k + 1; }
+
+  static std::uint64_t edge(std::uint32_t a, std::uint32_t b) {
+    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+  }
+  void note_edge(std::uint32_t a, std::uint32_t b) {
+    if (a != b && !is_whole_.empty() && is_on_seam(a) && is_on_seam(b)) {
+      seam_edges_.insert(edge(a, b));
+    }
+  }
+  bool may_join_on_seam(std::uint32_t a, std::uint32_t b) const {
+    if (is_whole_.empty() || (is_whole_[a] == 0 && is_whole_[b] == 0)) return false;
+    return !seam_edges_.contains(edge(a, b));
+  }
 
   bool has_more_than_three(std::uint32_t a) const {
     std::size_t degree = 0;
@@ -208,9 +235,12 @@ class Corners {
   }
 
   const std::size_t least_;
+  const std::size_t most_;
   std::vector<std::uint32_t> table_;
-  std::vector<std::uint32_t> corner_;  // by vertex: one of its corners
-  std::vector<std::uint8_t> is_seam_;  // by vertex
+  std::vector<std::uint32_t> corner_;             // by vertex: one of its corners
+  std::vector<std::uint8_t> is_seam_;             // by vertex
+  std::vector<std::uint8_t> is_whole_;            // by vertex; empty if nothing is known
+  std::unordered_set<std::uint64_t> seam_edges_;  // of two vertices of the seam, if that is known
   std::size_t left_;
   std::vector<std::uint32_t> ring_, star_;
 };

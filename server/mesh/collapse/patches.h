@@ -17,12 +17,15 @@ namespace isomesh::mesh::collapse {
 // Larger blocks have fewer seams, smaller ones stay in the cache.
 inline constexpr double kBlockTriangles = 6000;
 
+inline constexpr std::uint8_t kStays = 1;
+inline constexpr std::uint8_t kIsElsewhere = 2;  // too: has further triangles
+
 // Some triangles of a surface with vertices numbered anew.
 struct Patch {
   std::vector<std::uint32_t> names;  // of each vertex in the surface; ascending
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> numbers;  // of each triangle; none if the surface has none
-  std::vector<std::uint8_t> stays;     // of each vertex: may not change; at first none
+  std::vector<std::uint8_t> stays;     // of each vertex: kStays, kIsElsewhere; at first 0
   std::vector<std::uint8_t> first;     // of each vertex: to begin with
 };
 

@@ -185,14 +185,15 @@ class Simplifier {
     }
     for (std::size_t v = 0; v < found.size(); ++v) {
       const std::uint32_t name = patch.names[v];
-      if (found[v] != degrees[name] || is_held(name)) patch.stays[v] = 1;
+      if (found[v] != degrees[name]) patch.stays[v] |= collapse::kIsElsewhere;
+      if (is_held(name)) patch.stays[v] |= collapse::kStays;
     }
   }
 
   void hold_lines(Patch& patch) const {
     for (std::size_t v = 0; v < patch.names.size(); ++v) {
       const std::uint32_t name = patch.names[v];
-      if (mesh_.is_on_line(name) || is_held(name)) patch.stays[v] = 1;
+      if (mesh_.is_on_line(name) || is_held(name)) patch.stays[v] |= collapse::kStays;
     }
   }
 

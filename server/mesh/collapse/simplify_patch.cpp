@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "server/mesh/collapse/collapser.h"
@@ -28,14 +29,16 @@ class Simplifier : private Collapser<Simplifier> {
         around_(around),
         patch_(patch),
         most_(static_cast<float>(std::pow(around.max_error_mm / around.unit_mm, 2))) {
+    std::vector<std::uint8_t> is_whole;
     for (std::uint32_t v = 0; v < patch.names.size(); ++v) {
       if (patch.stays[v] != 0) corners_.put_on_seam(v);
-      patch.stays[v] = corners_.is_on_seam(v) ? 1 : 0;
-      Vecf place;
-      const Point way = minus(at(v), at(0));
-      place = narrow(Vecd{way[0], way[1], way[2]} * (1 / around.unit_mm));
+      is_whole.push_back((patch.stays[v] & kIsElsewhere) == 0);
+      patch.stays[v] |= corners_.is_on_seam(v) ? kStays : 0;
+      const auto [x, y, z] = minus(at(v), at(0));
+      const Vecf place = narrow(Vecd{x, y, z} * (1 / around.unit_mm));
       nodes_.push_back({{}, place, corners_.is_on_seam(v)});
     }
+    corners_.set_whole(std::move(is_whole));
     make_quadrics(patch.triangles);
   }
 
@@ -55,8 +58,9 @@ class Simplifier : private Collapser<Simplifier> {
 
  private:
   static constexpr int kBuckets = 2048;
-  static constexpr std::size_t kTries = Corners::kMostNeighbours;
+  static constexpr std::size_t kTries = 256;
   static constexpr std::size_t kLeastNeighbours = 3;
+  static constexpr std::size_t kMostNeighbours = 256;  // to look at takes the square of it
   static constexpr bool kInOrder = true;
   static constexpr bool kMovesTheOther = false;
 
