@@ -6,22 +6,21 @@
 #include <span>
 #include <vector>
 
-#include "server/mesh/context.h"
-#include "server/mesh/labels/separate.h"
+#include "server/mesh/collapse/misses.h"
+#include "server/mesh/collapse/simplify.h"
 #include "server/mesh/measure/point_triangle.h"
-#include "server/mesh/measure/surface_view.h"
-#include "server/mesh/measure/triangle_grid.h"
 
 namespace isomesh::mesh::collapse {
 
 // The vertices and centres of the original triangles. Each is near a triangle that is left, whose
-// centre is near the original. Triangles keep their numbers. Takes some 10 bytes a triangle beside
-// the grid. Thread safe for different triangles.
+// centre and middles of edges are near the original; both of the same wall. Where care is taken,
+// all points of triangles are. Triangles keep their numbers. Takes some 10 bytes a triangle. Thread
+// safe for different triangles.
 class KeptPoints {
  public:
-  // `sides`: of each triangle; empty if there is one wall. Throws as TriangleGrid.
-  KeptPoints(const SurfaceView& original, std::span<const WallSides> sides, double max_error_mm,
-             const Context& context);
+  // `grids`: of the original; must outlive it. `care`: as SimplifyOptions.
+  KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm,
+             std::span<const Care> care);
 
   struct Shape {
     std::uint32_t triangle = 0;
@@ -33,13 +32,18 @@ class KeptPoints {
   bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes);
 
  private:
+  bool is_careful(std::uint32_t point) const;
+  bool is_near(const Shape& shape, bool at_all_points) const;
+  bool has_whole_triangle_near(std::uint32_t triangle, std::uint32_t home,
+                               std::span<const Shape> shapes) const;
   std::uint32_t home_of(std::uint32_t point, std::uint32_t triangle,
                         std::span<const Shape> shapes) const;
 
-  const SurfaceView original_;
-  const std::span<const WallSides> sides_;
-  const double squared_mm_;
-  const TriangleGrid grid_;
+  const WalledSurface original_;
+  const WallGrids& grids_;
+  const double max_error_mm_;
+  const double squared_mm_;  // of points that are samples
+  const std::span<const Care> care_;
   std::vector<std::uint32_t> first_;  // of each triangle
   std::vector<std::uint32_t> next_;   // of each point, of the same triangle
 };

@@ -44,11 +44,22 @@ class WallGrids {
   std::size_t find(const WallSides& sides) const;
   const TriangleGrid& grid(std::size_t wall) const { return grids_[wall]; }
 
+  // The index of a triangle's own wall, and its number there.
+  const TriangleGrid& grid_of(std::uint32_t triangle) const { return grids_[wall_[triangle]]; }
+  std::uint32_t number_in_grid(std::uint32_t triangle) const { return number_[triangle]; }
+
  private:
-  std::vector<WallSides> sides_;     // of each wall, in ascending order
-  std::vector<Triangle> triangles_;  // of one wall after the other
+  std::vector<WallSides> sides_;              // of each wall, in ascending order
+  std::vector<std::uint32_t> wall_, number_;  // by triangle
+  std::vector<Triangle> triangles_;           // of one wall after the other
   std::deque<TriangleGrid> grids_;
 };
+
+// True if all of the triangle is within the distance of some of the others; false also where pieces
+// of a thousandth of the distance do not tell. `guess`: as TriangleGrid::nearest.
+bool is_within(const Corners& triangle, const TriangleGrid& others, std::uint32_t guess,
+               double within_mm);
+bool is_within(const Corners& triangle, std::span<const Corners> others, double within_mm);
 
 struct Miss {
   std::uint32_t triangle = 0;

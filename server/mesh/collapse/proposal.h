@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "server/mesh/collapse/misses.h"
 #include "server/mesh/collapse/simplify.h"
 #include "server/mesh/context.h"
 #include "server/mesh/labels/separate.h"
@@ -17,9 +18,16 @@ struct Proposal {
   std::vector<WallSides> sides;
 };
 
-// The error is measured at vertices and centres of triangles only. `walls` are whose mesh it is, if
-// any. The same for any number of threads. Throws as simplify.
+// What the error is measured from.
+struct Original {
+  const WalledSurface& surface;
+  const WallGrids& grids;
+};
+
+// The error is measured at vertices, middles of edges and centres of triangles only; not at all
+// without an original. `walls` are whose mesh it is, if any. The same for any number of threads.
+// Throws as simplify.
 Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-                 const SeparatingSurface* walls);
+                 const SeparatingSurface* walls, const Original* original);
 
 }  // namespace isomesh::mesh

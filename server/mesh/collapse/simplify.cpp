@@ -42,7 +42,7 @@ class Simplifier {
  public:
   // `walls` are whose mesh it is, if any.
   Simplifier(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-             const SeparatingSurface* walls)
+             const SeparatingSurface* walls, const Original* original)
       : options_(options),
         context_(context),
         quiet_{context.stop, nullptr},
@@ -56,12 +56,9 @@ class Simplifier {
             triangles_, numbers_, mesh.positions.size(),
             [this](std::uint32_t v) { return place_of(v); }, scaled(extent_.high)) {
     std::iota(numbers_.begin(), numbers_.end(), 0U);
-    if (std::isfinite(options.max_error_mm)) {
-      const SurfaceView original(options.before.empty() ? mesh.positions.span() : options.before,
-                                 mesh.triangles.span());
-      points_.emplace(original, sides_, options.max_error_mm, quiet_);
-      around_.points = &*points_;
-    }
+    if (original == nullptr) return;
+    points_.emplace(original->surface, original->grids, options.max_error_mm, options.care);
+    around_.points = &*points_;
   }
 
   SimplificationEffect run() {
@@ -198,7 +195,7 @@ class Simplifier {
   }
 
   bool is_held(std::uint32_t vertex) const {
-    return !options_.held.empty() && options_.held[vertex] != 0;
+    return !options_.care.empty() && options_.care[vertex] == Care::kStays;
   }
 
   const SimplifyOptions& options_;
@@ -218,8 +215,8 @@ class Simplifier {
 }  // namespace
 
 Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-                 const SeparatingSurface* walls) {
-  Simplifier simplifier(options, context, mesh, walls);
+                 const SeparatingSurface* walls, const Original* original) {
+  Simplifier simplifier(options, context, mesh, walls, original);
   const SimplificationEffect effect = simplifier.run();
   return {effect, std::move(simplifier.triangles()), simplifier.sides()};
 }

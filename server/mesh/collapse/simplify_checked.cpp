@@ -5,7 +5,6 @@
 #include <numeric>
 #include <span>
 #include <string>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -21,53 +20,7 @@
 namespace isomesh::mesh {
 namespace {
 
-// The share of the error that a proposal may have where it is measured. With less, there are more
-// triangles; with more, other points are beyond the error, and proposals are made again.
-constexpr double kMeasuredShare = 0.9;
-constexpr int kMostAttempts = 8;
-constexpr double kFirstRadius = 0.5;  // of an edge: what is held around a place
-
-// Cubes around places.
-class Surroundings {
- public:
-  Surroundings(const Extent& extent, double radius_mm)
-      : low_(extent.low),
-        side_(std::max({radius_mm, (extent.high[0] - extent.low[0]) / kMostCubes,
-                        (extent.high[1] - extent.low[1]) / kMostCubes,
-                        (extent.high[2] - extent.low[2]) / kMostCubes})) {}
-
-  void add(const Point& place) {
-    const Cube cube = cube_of(place);
-    for (int n = 0; n < 27; ++n) {
-      cubes_.insert(key({cube[0] + n % 3 - 1, cube[1] + n / 3 % 3 - 1, cube[2] + n / 9 - 1}));
-    }
-  }
-  bool contain(const Point& place) const { return cubes_.contains(key(cube_of(place))); }
-
- private:
-  static constexpr int kMostCubes = 1 << 18;
-  using Cube = std::array<std::int64_t, 3>;
-
-  Cube cube_of(const Point& place) const {
-    Cube cube;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      cube[axis] = static_cast<std::int64_t>(std::floor((place[axis] - low_[axis]) / side_));
-    }
-    return cube;
-  }
-  static std::uint64_t key(const Cube& cube) {
-    constexpr std::int64_t kBegin = 1 << 19;
-    std::uint64_t key = 0;
-    for (const std::int64_t number : cube) {
-      key = key << 21 | static_cast<std::uint64_t>(number + kBegin);
-    }
-    return key;
-  }
-
-  Point low_;
-  double side_;
-  std::unordered_set<std::uint64_t> cubes_;
-};
+constexpr int kMostAttempts = 10;
 
 // Makes proposals until one is within the error at all its points, and those of the surface. After
 // the first, it only looks at what has changed.
@@ -87,30 +40,27 @@ class Checker {
                    mesh.triangles.span()},
                   walls == nullptr ? std::span<const WallSides>() : walls->sides.span()},
         grids_(original_, quiet_),
-        own_crossings_(extent_, edge_mm_),
-        held_(mesh.positions.size(), 0) {
-    if (!options.held.empty()) held_.assign(options.held.begin(), options.held.end());
-    for (const IntersectingPair& pair : find_self_intersections(mesh, quiet_, kAll).places) {
-      own_crossings_.add(pair.place);
-    }
+        own_crossings_(crossings_of(mesh), edge_mm_),
+        care_(mesh.positions.size(), Care::kSamples) {
+    if (!options.care.empty()) care_.assign(options.care.begin(), options.care.end());
     lost_.resize(mesh.triangles.size());
     std::iota(lost_.begin(), lost_.end(), 0U);
   }
 
   Proposal run() {
     SimplifyOptions options = options_;
-    options.max_error_mm = kMeasuredShare * options_.max_error_mm;
-    options.held = held_;
+    options.care = care_;
+    const Original original = {original_, grids_};
     for (int attempt = 1;; ++attempt) {
       const Context part =
           context_.part(1 - std::pow(0.5, attempt - 1), 1 - std::pow(0.5, attempt));
-      Proposal proposal = propose(options, part, mesh_, walls_);
+      Proposal proposal = propose(options, part, mesh_, walls_, &original);
       look_at(proposal);
-      if (places_.empty() || attempt == kMostAttempts) {
-        proposal.effect.is_within = is_within_;
+      if ((beyond_.empty() && crossings_.empty()) || attempt == kMostAttempts) {
+        proposal.effect.is_within = beyond_.empty();
         return proposal;
       }
-      hold(kFirstRadius * edge_mm_ * attempt);
+      take_care();
     }
   }
 
@@ -127,22 +77,33 @@ class Checker {
     return {triangle[0], triangle[1], triangle[2], std::uint32_t{sides.front} << 16 | sides.back};
   }
 
+  std::vector<Box> crossings_of(const SurfaceView& surface) const {
+    std::vector<Box> boxes;
+    for (const IntersectingPair& pair : find_self_intersections(surface, quiet_, kAll).places) {
+      boxes.push_back({pair.place, pair.place});
+    }
+    return boxes;
+  }
+
   // Remembers the places where the proposal is beyond the error, or newly intersects itself.
   void look_at(const Proposal& proposal) {
     const WalledSurface proposed = {{mesh_.positions.span(), proposal.triangles}, proposal.sides};
+    beyond_.clear();
+    crossings_.clear();
     const std::vector<std::uint32_t> fresh = find_fresh(proposed);
     look_for_crossings(proposed, fresh);
     const auto added = find_misses(proposed, fresh, grids_, options_.max_error_mm, quiet_);
+    suspects_.clear();
     for (const Miss& miss : added) {
-      places_.push_back(miss.place);
-      known_.erase(std::ranges::lower_bound(known_, key_of(proposed, miss.triangle)));
+      beyond_.push_back(box_of(proposed.view, proposed.view.triangles[miss.triangle]));
+      suspects_.push_back(key_of(proposed, miss.triangle));
     }
+    std::ranges::sort(suspects_);
     look_for_losses(proposed);
-    is_within_ = added.empty() && lost_.empty();
   }
 
-  // The triangles that are not known to be within the error. Also remembers them, and boxes of
-  // those and of what is gone.
+  // The triangles that are not known to be within the error. Also remembers all, and boxes of what
+  // is new and of what is gone.
   std::vector<std::uint32_t> find_fresh(const WalledSurface& proposed) {
     std::vector<std::pair<Key, std::uint32_t>> all(proposed.view.triangles.size());
     for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = {key_of(proposed, t), t};
@@ -155,12 +116,13 @@ class Checker {
     auto known = known_.begin();
     for (const auto& [key, t] : all) {
       for (; known != known_.end() && *known < key; ++known) change(*known);
-      if (known != known_.end() && *known == key) {
+      const bool is_known = known != known_.end() && *known == key;
+      if (is_known) {
         ++known;
-        continue;
+      } else {
+        change(key);
       }
-      change(key);
-      fresh.push_back(t);
+      if (!is_known || std::ranges::binary_search(suspects_, key)) fresh.push_back(t);
     }
     for (; known != known_.end(); ++known) change(*known);
     known_.clear();
@@ -175,9 +137,8 @@ class Checker {
       boxes.push_back(box_of(proposed.view, proposed.view.triangles[t]));
     }
     const Part near(proposed, MarkedCubes(boxes, 0));
-    for (const IntersectingPair& pair :
-         find_self_intersections(near.surface().view, quiet_, kAll).places) {
-      if (!own_crossings_.contain(pair.place)) places_.push_back(pair.place);
+    for (const Box& crossing : crossings_of(near.surface().view)) {
+      if (!own_crossings_.are_near(crossing)) crossings_.push_back(crossing);
     }
   }
 
@@ -200,17 +161,19 @@ class Checker {
     lost_.clear();
     for (const Miss& miss : find_misses(original_, which, grids, options_.max_error_mm, quiet_)) {
       lost_.push_back(miss.triangle);
-      places_.push_back(miss.place);
-      for (const std::uint32_t v : mesh_.triangles[miss.triangle]) held_[v] = 1;
+      beyond_.push_back(box_of(original_.view, original_.view.triangles[miss.triangle]));
     }
   }
 
-  void hold(double radius_mm) {
-    Surroundings around(extent_, radius_mm);
-    for (const Point& place : places_) around.add(place);
-    places_.clear();
-    for_each(quiet_, held_.size(), [&](std::size_t v) {
-      if (around.contain(to_point(mesh_.positions[v]))) held_[v] = 1;
+  // Around the triangles that are beyond the error, and where others cross.
+  void take_care() {
+    const MarkedCubes beyond(beyond_, edge_mm_ / 2);
+    const MarkedCubes crossings(crossings_, edge_mm_ / 2);
+    for_each(quiet_, care_.size(), [&](std::size_t v) {
+      const Point place = to_point(mesh_.positions[v]);
+      const Box box = {place, place};
+      if (beyond.are_near(box)) care_[v] = std::max(care_[v], Care::kAllPoints);
+      if (crossings.are_near(box)) care_[v] = Care::kStays;
     });
   }
 
@@ -241,14 +204,15 @@ class Checker {
   const Extent extent_;
   const double edge_mm_;  // about the length of one
   const WalledSurface original_;
-  const WallGrids grids_;       // of it
-  Surroundings own_crossings_;  // of the mesh with itself
-  std::vector<std::uint8_t> held_;
-  std::vector<Key> known_;  // of proposed triangles that need no other look; in order
+  const WallGrids grids_;            // of it
+  const MarkedCubes own_crossings_;  // of the mesh with itself
+  std::vector<Care> care_;           // near each vertex
+  std::vector<Key> known_;           // of the triangles of the last proposal, in order
+  std::vector<Key> suspects_;        // those beyond the error, in order
   std::vector<Box> changed_;
   std::vector<std::uint32_t> lost_;  // original triangles beyond the error; in order
-  std::vector<Point> places_;        // of what is wrong
-  bool is_within_ = false;
+  std::vector<Box> beyond_;          // around triangles beyond the error
+  std::vector<Box> crossings_;       // where others cross each other newly
 };
 
 SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh,
@@ -262,7 +226,7 @@ SimplificationEffect simplify(const SimplifyOptions& options, const Context& con
   if (mesh.triangles.size() == 0) return {};
   Proposal proposal = std::isfinite(options.max_error_mm)
                           ? Checker(options, context, mesh, walls).run()
-                          : propose(options, context, mesh, walls);
+                          : propose(options, context, mesh, walls, nullptr);
   context.throw_if_stopped();
   replace_triangles(proposal.triangles, proposal.sides, mesh);
   if (walls != nullptr) {
