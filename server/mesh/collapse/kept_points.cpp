@@ -1,5 +1,6 @@
 #include "server/mesh/collapse/kept_points.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -55,6 +56,8 @@ bool KeptPoints::replace(std::span<const std::uint32_t> star, std::span<const Sh
 std::uint32_t KeptPoints::home_of(std::uint32_t point, std::uint32_t triangle,
                                   std::span<const Shape> shapes) const {
   const Point at = measured_point(original_, point);
+  const auto own = std::ranges::find(shapes, triangle, &Shape::triangle);
+  if (own != shapes.end() && squared_distance(at, own->corners) <= squared_mm_) return triangle;
   for (const Shape& shape : shapes) {
     if (!sides_.empty() && sides_[shape.triangle] != sides_[triangle]) continue;
     if (squared_distance(at, shape.corners) <= squared_mm_) return shape.triangle;
