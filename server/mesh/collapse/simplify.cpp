@@ -92,10 +92,11 @@ class Simplifier {
   bool is_enough() const { return triangles_.size() <= options_.triangles; }
 
   void reduce_within_error() {
-    for (const bool is_second : {false, true}) reduce_lines({side(), is_second, false}, 0);
+    const float side_of_all = side();  // which seams must be found by again
+    for (const bool is_second : {false, true}) reduce_lines({side_of_all, is_second, false}, 0);
     for (const bool is_second : {false, true}) {
       const Context context = is_second ? context_.part(0.7, 1) : context_.part(0, 0.7);
-      reduce({side(), is_second, is_second}, context, 0);
+      reduce({side_of_all, is_second, is_second}, context, 0);
     }
   }
 
