@@ -55,7 +55,7 @@ class Simplifier {
         extent_(measure_extent(mesh, quiet_)),
         triangles_(mesh.triangles.begin(), mesh.triangles.end()),
         numbers_(triangles_.size()),
-        around_{mesh, unit_of(extent_, triangles_.size()), nullptr, options.max_error_mm},
+        around_{quiet_, mesh, unit_of(extent_, triangles_.size()), nullptr, options.max_error_mm},
         patches_(
             triangles_, numbers_, mesh.positions.size(),
             [this](std::uint32_t v) { return place_of(v); }, scaled(extent_.high)) {
