@@ -93,6 +93,8 @@ bool KeptPoints::has_whole_triangle_near(std::uint32_t triangle, std::uint32_t h
 std::uint32_t KeptPoints::home_of(std::uint32_t point, std::uint32_t triangle,
                                   std::span<const Shape> shapes) const {
   const Point at = measured_point(original_.view, point);
+  const auto own = std::ranges::find(shapes, triangle, &Shape::triangle);
+  if (own != shapes.end() && squared_distance(at, own->corners) <= squared_mm_) return triangle;
   for (const Shape& shape : shapes) {
     if (original_.sides_of(shape.triangle) != original_.sides_of(triangle)) continue;
     if (squared_distance(at, shape.corners) <= squared_mm_) return shape.triangle;

@@ -29,6 +29,7 @@ constexpr double kLeastShare = 0.25;
 // Of the target: what blocks leave for the whole surface, where the least of all edges goes first.
 constexpr double kForTheWhole = 1.5;
 constexpr double kMostCubesPerAxis = 64;
+constexpr CubeCut kWhole = {std::numeric_limits<float>::infinity(), false, false};
 
 // The length of edges of a triangle of the mean area, or anything.
 double unit_of(const Extent& extent, std::size_t triangles) {
@@ -51,7 +52,7 @@ class Simplifier {
         extent_(measure_extent(mesh, quiet_)),
         triangles_(mesh.triangles.begin(), mesh.triangles.end()),
         numbers_(triangles_.size()),
-        around_{mesh, unit_of(extent_, triangles_.size()), nullptr, options.max_error_mm},
+        around_{quiet_, mesh, unit_of(extent_, triangles_.size()), nullptr, options.max_error_mm},
         patches_(
             triangles_, numbers_, mesh.positions.size(),
             [this](std::uint32_t v) { return place_of(v); }, scaled(extent_.high)) {
@@ -85,10 +86,11 @@ class Simplifier {
   bool is_enough() const { return triangles_.size() <= options_.triangles; }
 
   void reduce_within_error() {
-    for (const bool is_second : {false, true}) reduce_lines(is_second, 0);
+    const float side_of_all = side();  // which seams must be found by again
+    for (const bool is_second : {false, true}) reduce_lines({side_of_all, is_second, false}, 0);
     for (const bool is_second : {false, true}) {
       const Context context = is_second ? context_.part(0.7, 1) : context_.part(0, 0.7);
-      reduce({side(), is_second, is_second}, context, 0);
+      reduce({side_of_all, is_second, is_second}, context, 0);
     }
   }
 
@@ -100,24 +102,37 @@ class Simplifier {
       const double aim = std::max(kForTheWhole * target, kLeastShare * before);
       if (before <= aim) break;
       const bool is_shifted = round % 2 == 1;
-      reduce_lines(is_shifted, aim / before);
+      reduce_lines({side(), is_shifted, false}, aim / before);
       // Cubes grow with the triangles, so that in the end few seams are left to keep them.
       const double begin = std::exchange(done, done + 0.7 * (1 - done));
       reduce({side(), is_shifted, false}, context_.part(begin, done), aim / before);
       if (10 * (before - static_cast<double>(triangles_.size())) < before - aim) break;
     }
-    reduce_whole(options_.triangles);
+    // Junction curves keep walls from becoming fewer triangles, and walls keep curves.
+    double most = 1;
+    for (std::size_t before = 0; before != triangles_.size() && !is_enough(); most = kLeastShare) {
+      before = triangles_.size();
+      reduce_lines(kWhole, std::min(most, target / static_cast<double>(before)));
+      reduce_whole(options_.triangles);
+      if (sides_.empty()) break;
+    }
     effect_.reached_triangles = is_enough();
-    if (effect_.reached_triangles) return;
+    effect_.is_least = !effect_.reached_triangles && is_least();
+  }
+
+  bool is_least() {
+    if (!points_) return true;
     // Any further collapse, whatever the error, is enough to tell that it was not the topology.
     const std::vector<Triangle> triangles = triangles_;
     const std::vector<std::uint32_t> numbers = numbers_;
     around_.points = nullptr;
     around_.max_error_mm = std::numeric_limits<double>::infinity();
+    reduce_lines(kWhole, 0);
     reduce_whole(triangles.size() - 1);
-    effect_.is_least = triangles_.size() == triangles.size();
+    const bool is_least = triangles_.size() == triangles.size();
     triangles_ = triangles;
     numbers_ = numbers;
+    return is_least;
   }
 
   // In the unit of `around_`.
@@ -138,10 +153,10 @@ class Simplifier {
   }
 
   // Simplifies the junction curves within each cube.
-  void reduce_lines(bool is_shifted, double share) {
+  void reduce_lines(const CubeCut& cut, double share) {
     if (sides_.empty()) return;
     const std::vector<std::uint32_t> degrees = count_triangles();
-    patches_.collapse({side(), is_shifted, false}, quiet_, [&](Patch& patch) {
+    patches_.collapse(cut, quiet_, [&](Patch& patch) {
       set_stays(degrees, patch);
       simplify_lines(around_, sides_, share, patch);
     });
@@ -158,11 +173,10 @@ class Simplifier {
   }
 
   void reduce_whole(std::size_t least) {
-    patches_.collapse({std::numeric_limits<float>::infinity(), false, false}, quiet_,
-                      [&](Patch& patch) {
-                        hold_lines(patch);
-                        simplify_patch(around_, least, around_.points == nullptr, patch);
-                      });
+    patches_.collapse(kWhole, quiet_, [&](Patch& patch) {
+      hold_lines(patch);
+      simplify_patch(around_, least, around_.points == nullptr, patch);
+    });
   }
 
   // How many triangles each vertex has.

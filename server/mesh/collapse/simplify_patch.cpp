@@ -18,6 +18,7 @@ using mesh::dot;
 
 // No triangle is turned farther than this by one collapse.
 constexpr double kLeastCosine = 0.25;
+constexpr std::size_t kTriesPerLook = 1024;  // at whether the job is cancelled
 
 class Simplifier : private Collapser<Simplifier> {
   using Base = Collapser<Simplifier>;
@@ -71,6 +72,7 @@ class Simplifier : private Collapser<Simplifier> {
   }
 
   bool collapse(std::uint32_t a, std::size_t k, int bucket) {
+    if (++tries_ % kTriesPerLook == 0) around_.context.throw_if_stopped();
     const std::vector<std::uint32_t>& ring = corners_.ring();
     const std::uint32_t b = ring[k];
     star_.clear();
@@ -105,6 +107,7 @@ class Simplifier : private Collapser<Simplifier> {
   Patch& patch_;
   const float most_;  // as a squared distance
   bool may_turn_ = false;
+  std::size_t tries_ = 0;
   std::vector<std::uint32_t> star_;
   std::vector<KeptPoints::Shape> shapes_;
 };
