@@ -249,7 +249,7 @@ class Collapser {
 };
 
 void collapse_six(const CollapseSurroundings& around, std::size_t least, Block& block) {
-  Collapser<FastClear>(around, block).run(least);
+  Collapser<FastClear<SixPlanes>>(around, block).run(least);
 }
 
 void collapse_five(const CollapseSurroundings& around, std::size_t least, Block& block) {
@@ -257,7 +257,7 @@ void collapse_five(const CollapseSurroundings& around, std::size_t least, Block&
 }
 
 void collapse_bcc(const CollapseSurroundings& around, std::size_t least, Block& block) {
-  Collapser<SlowClear<BccPlanes>>(around, block).run(least);
+  Collapser<FastClear<BccPlanes>>(around, block).run(least);
 }
 
 }  // namespace isomesh::mesh::collapse::HWY_NAMESPACE
