@@ -172,7 +172,7 @@ class Prover : private Collapser<Prover<Test>> {
 };
 
 void collapse_six(const CollapseSurroundings& around, std::size_t least, Block& block) {
-  Prover<FastClear>(around, block).run(least);
+  Prover<FastClear<SixPlanes>>(around, block).run(least);
 }
 
 void collapse_five(const CollapseSurroundings& around, std::size_t least, Block& block) {
@@ -180,7 +180,7 @@ void collapse_five(const CollapseSurroundings& around, std::size_t least, Block&
 }
 
 void collapse_bcc(const CollapseSurroundings& around, std::size_t least, Block& block) {
-  Prover<SlowClear<BccPlanes>>(around, block).run(least);
+  Prover<FastClear<BccPlanes>>(around, block).run(least);
 }
 
 }  // namespace isomesh::mesh::collapse::HWY_NAMESPACE

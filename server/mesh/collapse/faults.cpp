@@ -81,7 +81,7 @@ void find_with(const TubeStart& start, std::span<const std::uint32_t> triangles,
 
 void find_faults_of_six(const TubeStart& start, std::span<const std::uint32_t> triangles,
                         std::vector<std::uint32_t>& faults) {
-  find_with<FastClear>(start, triangles, faults);
+  find_with<FastClear<SixPlanes>>(start, triangles, faults);
 }
 
 void find_faults_of_five(const TubeStart& start, std::span<const std::uint32_t> triangles,
@@ -91,7 +91,7 @@ void find_faults_of_five(const TubeStart& start, std::span<const std::uint32_t> 
 
 void find_faults_of_bcc(const TubeStart& start, std::span<const std::uint32_t> triangles,
                         std::vector<std::uint32_t>& faults) {
-  find_with<SlowClear<BccPlanes>>(start, triangles, faults);
+  find_with<FastClear<BccPlanes>>(start, triangles, faults);
 }
 
 }  // namespace isomesh::mesh::collapse::HWY_NAMESPACE

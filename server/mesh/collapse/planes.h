@@ -7,9 +7,11 @@
 //  * five-way: x, y, z, (x+y+z)/2, (-x+y+z)/2, (x-y+z)/2, (x+y-z)/2, counted from a sample of even
 //    i+j+k, and lines in 9 directions: along the axes, and through even samples along the diagonals
 //    of faces;
-//  * body-centred: x-y, y-z, x-z, x+y, y+z, x+z, and lines in 7 directions: along the axes, and
-//    along the diagonals of cells, through samples and centres. Cells with a phantom are split in
-//    six, and faces at the border as there: x, y, z, and lines along the diagonals of faces.
+//  * body-centred: u = y+z, v = x+z, w = x+y, u-v, v-w, u-w, and lines in 7 directions. All three
+//  of
+//    u, v and w are whole at samples and at centres alone, and the tetrahedra are the six-way ones
+//    between them. Cells with a phantom are split in six, and so are faces at the border: x, y, z,
+//    and lines in 3 more directions, along the diagonals of faces.
 #pragma once
 
 #include <algorithm>
@@ -101,25 +103,37 @@ struct FivePlanes {
   static double value(const float* corner, const SampleSteps& steps, bool is_odd, Vecd in_cell);
 };
 
+constexpr std::array<LineDirection, 10> bcc_lines() {
+  std::array<LineDirection, 10> lines = {};
+  constexpr std::uint8_t kFirst = 3;  // of u, v and w
+  const auto half_steps = [](const std::array<std::int8_t, 3>& steps) {
+    const auto& [u, v, w] = steps;
+    return std::array{static_cast<std::int8_t>(v + w - u), static_cast<std::int8_t>(u + w - v),
+                      static_cast<std::int8_t>(u + v - w)};
+  };
+  for (std::size_t d = 0; d < SixPlanes::kLines.size(); ++d) {
+    const LineDirection& six = SixPlanes::kLines[d];
+    lines[d].first = six.first + kFirst;
+    lines[d].second = six.second + kFirst;
+    lines[d].along = six.along + kFirst;
+    lines[d].per_first = half_steps(six.per_first);
+    lines[d].per_second = half_steps(six.per_second);
+    lines[d].per_along = half_steps(six.per_along);
+  }
+  lines[7] = {6, 2, 1, {-2, 0, 0}, {0, 0, 2}, {2, 2, 0}};
+  lines[8] = {7, 0, 2, {0, -2, 0}, {2, 0, 0}, {0, 2, 2}};
+  lines[9] = {8, 1, 2, {-2, 0, 0}, {0, 2, 0}, {2, 0, 2}};
+  return lines;
+}
+
 struct BccPlanes {
   using Numbers = NumbersOf<16>;
   static constexpr std::size_t kFamilies = 9;
-  static constexpr std::array<LineDirection, 10> kLines = {{
-      {7, 4, 0, {0, 1, 1}, {0, 1, -1}, {2, 0, 0}},
-      {8, 5, 1, {1, 0, 1}, {1, 0, -1}, {0, 2, 0}},
-      {6, 3, 2, {1, 1, 0}, {1, -1, 0}, {0, 0, 2}},
-      {3, 4, 2, {2, 0, 0}, {2, 2, 0}, {2, 2, 2}},
-      {3, 7, 1, {2, 0, 0}, {0, 0, 2}, {2, 2, -2}},
-      {6, 7, 1, {2, 0, 0}, {0, 0, 2}, {-2, 2, -2}},
-      {6, 4, 1, {2, 0, 0}, {0, 0, -2}, {-2, 2, 2}},
-      {3, 2, 1, {2, 0, 0}, {0, 0, 2}, {2, 2, 0}},
-      {4, 0, 2, {0, 2, 0}, {2, 0, 0}, {0, 2, 2}},
-      {5, 1, 2, {2, 0, 0}, {0, 2, 0}, {2, 0, 2}},
-  }};
+  static constexpr std::array<LineDirection, 10> kLines = bcc_lines();
 
   static Vecd base_of(Vecd cell) { return cell; }
   static Numbers numbers(Vecf d) {
-    return {{d.x, d.y, d.z, d.x - d.y, d.y - d.z, d.x - d.z, d.x + d.y, d.y + d.z, d.x + d.z}};
+    return {{d.x, d.y, d.z, d.y + d.z, d.x + d.z, d.x + d.y, d.y - d.x, d.z - d.y, d.z - d.x}};
   }
   static double value(const float* corner, const SampleSteps& steps, bool is_odd, Vecd in_cell);
 };
