@@ -2,18 +2,18 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <vector>
 
 #include "client/verify/surface.h"
-#include "proto/types.h"
 #include "server/import/message/import_message.h"
 
 namespace isomesh::verify {
 
+using Sample = std::array<std::int64_t, 3>;  // indices along the axes of a volume
+
 struct Field {
-  std::array<std::int64_t, 3> dims = {0, 0, 0};
-  std::vector<double> samples;  // x fastest
+  Sample dims = {0, 0, 0};
+  std::vector<double> values;  // x fastest
   Vec origin = {0, 0, 0};
   std::array<Vec, 3> steps = {};  // from a sample to the next along i, j and k
 
@@ -22,23 +22,26 @@ struct Field {
   }
   Vec index_of(const Vec& place) const;
 
-  // Keeps the samples within the extents of the box along the volume's axes.
-  void crop(const std::array<Vec, 2>& box);
+  // The samples of a box of indices. Those outside of the volume are infinitely low.
+  Field part(const Sample& begin, const Sample& end) const;
+
+  // The samples within the extents of a box along the volume's axes. Throws Error
+  // kInvalidParameter if there are none.
+  Field cropped(const std::array<Vec, 2>& box) const;
 };
 
-// Reads a file, or a folder, by the program isomesh-import. Throws what that says, or Error
-// kInvalidParameter if the program is missing.
+// Reads a file, or a folder, by the program isomesh-import. Throws Error, also if that is missing.
 Field read_field(const std::filesystem::path& volume, const import::ImportOptions& options);
 
 struct Cut {
   double iso = 0;
   int tetrahedra = 6;     // of a cell: 6 (Kuhn's split) or 5
-  bool close = false;     // the field is infinitely low outside the volume
+  bool close = false;     // the field is infinitely low outside of the volume
   bool midpoint = false;  // only the sign of the field counts
 };
 
-// The set where field - iso is zero, linear in each tetrahedron. Triangles face lower values; some
-// have no area, where a sample equals the iso-value or lies on a cap.
+// The set where the field is `iso`, linear in each tetrahedron. Triangles face lower values; some
+// have no area, where a sample has that value or the surface is closed.
 Surface zero_set(const Field& field, const Cut& cut);
 
 }  // namespace isomesh::verify

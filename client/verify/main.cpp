@@ -9,7 +9,6 @@
 #include "base/command_line/help.h"
 #include "base/command_line/manual.h"
 #include "base/files.h"
-#include "client/verify/mesh_file.h"
 #include "client/verify/verify.h"
 
 namespace {
@@ -77,7 +76,7 @@ int run(const Arguments& arguments) {
   verify::Cut cut = arguments.cut;
   if (!arguments.crop.empty()) {
     const auto& box = arguments.crop;
-    field.crop({verify::Vec{box[0], box[1], box[2]}, verify::Vec{box[3], box[4], box[5]}});
+    field = field.cropped({verify::Vec{box[0], box[1], box[2]}, {box[3], box[4], box[5]}});
     cut.close = true;
   }
   verify::Surface surface = verify::zero_set(field, cut);

@@ -1,4 +1,3 @@
-#include "client/verify/mesh_file.h"
 
 #include <algorithm>
 #include <bit>
@@ -9,17 +8,18 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "client/verify/verify.h"
 #include "proto/json_tree.h"
 
 namespace isomesh::verify {
 namespace {
 
 using namespace json_values;
-using Indices = std::array<std::uint32_t, 3>;
 
 static_assert(std::endian::native == std::endian::little, "the files are little-endian");
 
 constexpr std::size_t kPoint = 3 * sizeof(float);
+constexpr std::uint64_t kNone = UINT32_MAX;
 
 [[noreturn]] void refuse(const std::string& reason) {
   throw Error(ErrorCode::kInvalidParameter, "the mesh cannot be read: " + reason);
@@ -32,20 +32,17 @@ T at(std::string_view bytes, std::size_t offset) {
   return value;
 }
 
-Vec point_at(std::string_view bytes, std::size_t offset) {
-  const auto p = at<std::array<float, 3>>(bytes, offset);
-  return {p[0], p[1], p[2]};
+void add_points(Surface& surface, std::string_view bytes) {
+  for (std::size_t n = 0; n < bytes.size(); n += kPoint) {
+    const auto [x, y, z] = at<std::array<float, 3>>(bytes, n);
+    surface.points.push_back({x, y, z});
+  }
 }
 
-void add_corners(Surface& surface, const Corners& corners) {
-  const auto first = static_cast<std::uint32_t>(surface.points.size());
-  surface.points.insert(surface.points.end(), corners.begin(), corners.end());
-  surface.triangles.push_back({first, first + 1, first + 2});
-}
-
-double coordinate(std::string_view word) {
-  const auto x = parse_double(word);
-  return x ? *x : throw Error(ErrorCode::kInvalidParameter, "a coordinate of the STL is no number");
+// Of the last three points.
+void add_triangle(Surface& surface) {
+  const auto end = static_cast<std::uint32_t>(surface.points.size());
+  surface.triangles.push_back({end - 3, end - 2, end - 1});
 }
 
 Surface read_text_stl(std::string_view bytes) {
@@ -54,13 +51,14 @@ Surface read_text_stl(std::string_view bytes) {
   Surface surface;
   std::size_t n = 0;
   for (; n + kFacet < all.size() && all[n] == "facet"; n += kFacet) {
-    Corners corners;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const std::size_t vertex = n + 7 + 4 * c;
+    for (std::size_t vertex = n + 7; vertex < n + 19; vertex += 4) {
       if (all[vertex] != "vertex") refuse("a facet of the STL lacks a vertex");
-      for (std::size_t x = 0; x < 3; ++x) corners[c][x] = coordinate(all[vertex + 1 + x]);
+      const auto number = [&](std::size_t word) {
+        return parse_double(all[vertex + word]).value_or(std::nan(""));
+      };
+      surface.points.push_back({number(1), number(2), number(3)});
     }
-    add_corners(surface, corners);
+    add_triangle(surface);
   }
   if (n >= all.size() || all[n] != "endsolid") refuse("the STL is truncated or malformed");
   return surface;
@@ -79,8 +77,8 @@ Surface read_stl(std::string_view bytes) {
   }
   Surface surface;
   for (std::size_t facet = kHeader; facet < size; facet += kFacet) {
-    add_corners(surface, {point_at(bytes, facet + kPoint), point_at(bytes, facet + 2 * kPoint),
-                          point_at(bytes, facet + 3 * kPoint)});
+    add_points(surface, bytes.substr(facet + kPoint, 3 * kPoint));
+    add_triangle(surface);
   }
   return surface;
 }
@@ -111,7 +109,7 @@ Surface read_ply(std::string_view bytes) {
   }
   Surface surface;
   const std::size_t faces = counts[0] * kPoint;
-  for (std::size_t n = 0; n < faces; n += kPoint) surface.points.push_back(point_at(body, n));
+  add_points(surface, body.substr(0, faces));
   for (std::size_t n = faces; n < body.size(); n += kFace) {
     if (body[n] != 3) refuse("a face of the PLY is no triangle");
     surface.triangles.push_back(at<Indices>(body, n + 1));
@@ -119,105 +117,67 @@ Surface read_ply(std::string_view bytes) {
   return surface;
 }
 
-// A GLB of one surface, as isomesh writes it without a codec.
-class Glb {
- public:
-  explicit Glb(std::string_view bytes) {
-    constexpr std::size_t kHeader = 12;
-    if (bytes.size() < kHeader || at<std::uint32_t>(bytes, 8) != bytes.size()) {
-      refuse("the GLB is truncated");
-    }
-    bytes.remove_prefix(kHeader);
-    gltf_ = JsonTree(take_chunk(bytes, "JSON"));
-    if (!bytes.empty()) binary_ = take_chunk(bytes, std::string_view("BIN\0", 4));
-  }
+const Json& item(const Json& array, std::uint64_t index) {
+  if (index >= array_size(array)) refuse("the GLB names an object that it lacks");
+  return element(array, index);
+}
 
-  Surface read() const {
-    if (find(gltf_.root(), "extensionsRequired")) refuse("the GLB has a codec; ask for none");
-    Surface surface;
-    const Json& nodes = existing(listed("scenes", 0), "nodes");
-    if (array_size(nodes) == 0) return surface;
-    if (array_size(nodes) > 1) refuse("the GLB has several objects");
-    const Json& node = listed("nodes", count_in(element(nodes, 0)));
-    // Metres with Y up, from millimetres in LPS: (x, y, z) becomes (x, z, -y) / 1000.
-    expect(node, "rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)});
-    expect(node, "scale", {0.001, 0.001, 0.001});
-    expect(node, "translation", {});
-    expect(node, "matrix", {});
-    const Json& mesh = listed("meshes", count_in(existing(node, "mesh")));
-    const Json& primitive = element_of(existing(mesh, "primitives"), 0);
-    const Json& position = existing(existing(primitive, "attributes"), "POSITION");
-    const std::string_view points = items(position, 5126, "VEC3", kPoint);
-    const std::string_view corners = items(existing(primitive, "indices"), 5125, "SCALAR", 4);
-    for (std::size_t n = 0; n < points.size(); n += kPoint) {
-      surface.points.push_back(point_at(points, n));
-    }
-    for (std::size_t n = 0; n + sizeof(Indices) <= corners.size(); n += sizeof(Indices)) {
-      surface.triangles.push_back(at<Indices>(corners, n));
-    }
-    return surface;
-  }
+std::uint64_t number_in(const Json& json, const char* name, std::uint64_t standard) {
+  const Json* found = find(json, name);
+  return found != nullptr ? whole(*found, UINT32_MAX) : standard;
+}
 
- private:
-  // The content of the first chunk, which is removed.
-  static std::string_view take_chunk(std::string_view& bytes, std::string_view type) {
-    constexpr std::size_t kHeader = 8;
-    if (bytes.size() < kHeader || bytes.substr(4, 4) != type ||
-        bytes.size() - kHeader < at<std::uint32_t>(bytes, 0)) {
-      refuse("the GLB lacks a chunk, or a chunk is truncated");
-    }
-    const std::string_view chunk = bytes.substr(kHeader, at<std::uint32_t>(bytes, 0));
-    bytes.remove_prefix(kHeader + chunk.size());
-    return chunk;
+// The content of the first chunk, which is removed.
+std::string_view take_chunk(std::string_view& bytes, std::string_view type) {
+  constexpr std::size_t kHeader = 8;
+  if (bytes.size() < kHeader || bytes.substr(4, 4) != type ||
+      bytes.size() - kHeader < at<std::uint32_t>(bytes, 0)) {
+    refuse("the GLB is truncated or malformed");
   }
+  const std::string_view chunk = bytes.substr(kHeader, at<std::uint32_t>(bytes, 0));
+  bytes.remove_prefix(kHeader + chunk.size());
+  return chunk;
+}
 
-  static std::uint64_t count_in(const Json& json) { return whole(json, UINT32_MAX); }
-  static const Json& element_of(const Json& array, std::uint64_t index) {
-    if (index >= array_size(array)) refuse("the GLB names an object that it lacks");
-    return element(array, index);
+// The items of an accessor, without gaps.
+std::string_view items(const Json& gltf, std::string_view binary, std::uint64_t index,
+                       std::string_view shape, std::size_t bytes) {
+  const Json& accessor = item(existing(gltf, "accessors"), index);
+  const Json& view = item(existing(gltf, "bufferViews"), number_in(accessor, "bufferView", kNone));
+  const auto begin = number_in(view, "byteOffset", 0) + number_in(accessor, "byteOffset", 0);
+  const std::uint64_t size = bytes * number_in(accessor, "count", kNone);
+  const std::uint64_t type = shape == "VEC3" ? 5126 : 5125;  // floats, or 32-bit indices
+  if (text(existing(accessor, "type")) != shape ||
+      number_in(accessor, "componentType", 0) != type ||
+      number_in(view, "byteStride", bytes) != bytes || begin + size > binary.size()) {
+    refuse("the GLB lacks bytes, or has other things than floats and 32-bit indices");
   }
-  const Json& listed(const char* list, std::uint64_t index) const {
-    return element_of(existing(gltf_.root(), list), index);
+  return binary.substr(begin, size);
+}
+
+// The scene's only node turns millimetres in LPS into metres with Y up, and holds one primitive.
+Surface read_glb(std::string_view bytes) {
+  std::string_view rest = bytes.substr(std::min<std::size_t>(bytes.size(), 12));
+  const JsonTree tree(take_chunk(rest, "JSON"));
+  const Json& gltf = tree.root();
+  Surface surface;
+  if (find(gltf, "extensionsRequired") != nullptr) refuse("the GLB has a codec; ask for none");
+  const Json& nodes = existing(item(existing(gltf, "scenes"), 0), "nodes");
+  if (array_size(nodes) == 0) return surface;
+  const std::string_view binary = take_chunk(rest, std::string_view("BIN\0", 4));
+  const Json& node = item(existing(gltf, "nodes"), whole(item(nodes, 0), kNone));
+  const Json& mesh = item(existing(gltf, "meshes"), number_in(node, "mesh", kNone));
+  const Json& primitives = existing(mesh, "primitives");
+  if (array_size(nodes) + array_size(primitives) != 2) refuse("the GLB has several objects");
+  const Json& attributes = existing(item(primitives, 0), "attributes");
+  const auto points = items(gltf, binary, number_in(attributes, "POSITION", kNone), "VEC3", kPoint);
+  const auto corners = items(gltf, binary, number_in(item(primitives, 0), "indices", kNone),
+                             "SCALAR", sizeof(std::uint32_t));
+  add_points(surface, points);
+  for (std::size_t n = 0; n + sizeof(Indices) <= corners.size(); n += sizeof(Indices)) {
+    surface.triangles.push_back(at<Indices>(corners, n));
   }
-
-  static void expect(const Json& node, const char* name, const std::vector<double>& expected) {
-    std::vector<double> found;
-    const Json* numbers = find(node, name);
-    for (std::size_t n = 0; numbers && n < array_size(*numbers); ++n) {
-      found.push_back(number(element(*numbers, n)));
-    }
-    const auto is_near = [](double a, double b) { return std::abs(a - b) < 1e-9; };
-    if (!std::ranges::equal(found, expected, is_near)) refuse("the GLB is not placed by isomesh");
-  }
-
-  // The bytes of an accessor of that type.
-  std::string_view items(const Json& index, unsigned type, std::string_view shape,
-                         std::size_t item_bytes) const {
-    const Json& accessor = listed("accessors", count_in(index));
-    const Json& view = listed("bufferViews", count_in(existing(accessor, "bufferView")));
-    const auto optional = [](const Json& json, const char* name, std::uint64_t standard) {
-      const Json* found = find(json, name);
-      return found ? count_in(*found) : standard;
-    };
-    const auto begin = optional(view, "byteOffset", 0) + optional(accessor, "byteOffset", 0);
-    const std::uint64_t bytes = item_bytes * count_in(existing(accessor, "count"));
-    if (count_in(existing(accessor, "componentType")) != type || find(accessor, "sparse") ||
-        text(existing(accessor, "type")) != shape || begin + bytes > binary_.size() ||
-        optional(view, "byteStride", item_bytes) != item_bytes) {
-      refuse("the GLB lacks bytes, or has other things than floats and 32-bit indices");
-    }
-    return binary_.substr(begin, bytes);
-  }
-
-  JsonTree gltf_;
-  std::string_view binary_;
-};
-
-Surface read_glb(std::string_view bytes) try {
-  return Glb(bytes).read();
-} catch (const Error& error) {
-  if (error.code() == ErrorCode::kInvalidParameter) throw;
-  refuse(std::string("the GLB ") + error.what());
+  return surface;
 }
 
 void join_equal_points(Surface& surface) {
@@ -242,7 +202,7 @@ void join_equal_points(Surface& surface) {
 
 }  // namespace
 
-Surface read_surface(std::string_view bytes) {
+Surface read_surface(std::string_view bytes) try {
   const bool is_glb = bytes.starts_with("glTF");
   const bool is_ply = bytes.starts_with("ply\n");
   Surface surface = is_glb ? read_glb(bytes) : is_ply ? read_ply(bytes) : read_stl(bytes);
@@ -253,11 +213,15 @@ Surface read_surface(std::string_view bytes) {
   for (Vec& point : surface.points) {
     if (is_ras) point = {-point[0], -point[1], point[2]};
     if (!std::ranges::all_of(point, [](double x) { return std::abs(x) <= kMost; })) {
-      refuse("a coordinate is not finite, or is too large");
+      refuse("a coordinate is no number, or not finite");
     }
   }
   join_equal_points(surface);
   return surface;
+} catch (const Error& error) {
+  // The reader of JSON leaves out the subject.
+  if (error.code() == ErrorCode::kInvalidParameter) throw;
+  refuse(std::string("the GLB ") + error.what());
 }
 
 }  // namespace isomesh::verify

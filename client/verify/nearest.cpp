@@ -1,10 +1,10 @@
-#include "client/verify/nearest.h"
-
 #include <algorithm>
 #include <array>
 #include <numeric>
 #include <tuple>
 #include <utility>
+
+#include "client/verify/surface.h"
 
 namespace isomesh::verify {
 namespace {

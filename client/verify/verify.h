@@ -2,11 +2,17 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "client/verify/field.h"
-#include "client/verify/surface.h"
 
 namespace isomesh::verify {
+
+// The triangles in LPS millimetres: of binary or ASCII STL, or of PLY or GLB without a codec as
+// isomesh writes them. STL and PLY say if they are in RAS. Points with equal coordinates become
+// one. Memory is bounded by the bytes, whatever they say. Throws Error kInvalidParameter for other
+// bytes, truncated ones, and coordinates that are not finite.
+Surface read_surface(std::string_view bytes);
 
 struct Question {
   double bound = 0;         // in millimetres
@@ -20,8 +26,7 @@ struct Verdict {
 };
 
 // Holds if every point of each surface is within the bound of the other one, the edges of the mesh
-// fit together, and no component of it is turned inside out. `surface` is the field's zero set.
-// Both surfaces are reordered.
+// fit together, and no component of it is inside out. `surface` is the field's zero set.
 Verdict verify(Surface& mesh, Surface& surface, const Field& field, const Question& question);
 
 }  // namespace isomesh::verify
