@@ -15,6 +15,8 @@ namespace {
 using testing::HasSubstr;
 using verify::Surface;
 using verify::Vec;
+using verify::operator+;
+using verify::operator*;
 
 constexpr double kBound = 0.05;
 constexpr std::array<double, 4> kPlaces = {0.1, 0.37, 0.62, 0.93};  // of the triangles
