@@ -1,4 +1,3 @@
-
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -70,8 +69,8 @@ Surface read_stl(std::string_view bytes) {
   if (bytes.size() < kHeader) refuse("it is too short for an STL, PLY or GLB file");
   const auto count = at<std::uint32_t>(bytes, kHeader - sizeof(std::uint32_t));
   const std::uint64_t size = kHeader + std::uint64_t{count} * kFacet;
-  if (size != bytes.size() && bytes.starts_with("solid")) return read_text_stl(bytes);
   if (size != bytes.size()) {
+    if (bytes.starts_with("solid")) return read_text_stl(bytes);
     refuse("it has " + std::to_string(bytes.size()) + " bytes, but an STL file of " +
            std::to_string(count) + " triangles has " + std::to_string(size));
   }
@@ -157,7 +156,10 @@ std::string_view items(const Json& gltf, std::string_view binary, std::uint64_t 
 
 // The scene's only node turns millimetres in LPS into metres with Y up, and holds one primitive.
 Surface read_glb(std::string_view bytes) {
-  std::string_view rest = bytes.substr(std::min<std::size_t>(bytes.size(), 12));
+  if (bytes.size() < 12 || at<std::uint32_t>(bytes, 8) != bytes.size()) {
+    refuse("the GLB has another size than its header says");
+  }
+  std::string_view rest = bytes.substr(12);
   const JsonTree tree(take_chunk(rest, "JSON"));
   const Json& gltf = tree.root();
   Surface surface;

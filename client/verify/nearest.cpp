@@ -21,17 +21,17 @@ double squared_to_segment(const Vec& p, const Vec& a, const Vec& b) {
 
 }  // namespace
 
-double squared_distance(const Vec& p, const Corners& t) {
+double squared_distance(const Vec& p, const Corners& t, double enough) {
   const auto& [a, b, c] = t;
-  const Vec normal = normal_of(t);
+  const Vec n = normal_of(t);
   // The normal of a sliver is noise. Its edges are as near as it is.
-  const bool is_sliver = squared(normal) <= 1e-16 * squared(b - a) * squared(c - a);
-  const auto is_left = [&](const Vec& from, const Vec& to) {
-    return dot(cross(to - from, p - from), normal) >= 0;
-  };
-  if (!is_sliver && is_left(a, b) && is_left(b, c) && is_left(c, a)) {
-    const double height = dot(p - a, normal);
-    return height * height / squared(normal);
+  if (squared(n) > 1e-16 * squared(b - a) * squared(c - a)) {
+    const double from_plane = dot(p - a, n) * dot(p - a, n) / squared(n);
+    if (from_plane > enough ||
+        (dot(cross(b - a, p - a), n) >= 0 && dot(cross(c - b, p - b), n) >= 0 &&
+         dot(cross(a - c, p - c), n) >= 0)) {
+      return from_plane;
+    }
   }
   return std::min(
       {squared_to_segment(p, a, b), squared_to_segment(p, b, c), squared_to_segment(p, c, a)});
@@ -91,7 +91,7 @@ void Tree::build(std::vector<Item>& items, std::uint32_t begin, std::uint32_t en
 
 Nearest Tree::nearest(const Vec& point, std::uint32_t hint) const {
   if (nodes_.empty()) return {};
-  Nearest best = {squared_distance(point, surface_.corners(hint)), hint};
+  Nearest best = {squared_distance(point, surface_.corners(hint), kFar), hint};
   using Waiting = std::pair<double, std::uint32_t>;  // the squared distance to a node's box
   const auto waiting_for = [&](std::uint32_t node) {
     double sum = 0;
@@ -110,7 +110,7 @@ Nearest Tree::nearest(const Vec& point, std::uint32_t hint) const {
     if (least >= best.squared) continue;
     const Node& node = nodes_[at];
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
-      const double found = squared_distance(point, surface_.corners(t));
+      const double found = squared_distance(point, surface_.corners(t), best.squared);
       if (found < best.squared) best = {found, t};
     }
     if (node.count > 0) continue;

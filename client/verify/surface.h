@@ -41,8 +41,9 @@ struct Surface {
 // For each point the lowest point of its connected component.
 std::vector<std::uint32_t> components_of(const Surface& surface);
 
-// The square of the distance. Triangles without an area are segments or points.
-double squared_distance(const Vec& point, const Corners& triangle);
+// The square of the distance if that is at most `enough`; else any number above that. Triangles
+// without an area are segments or points.
+double squared_distance(const Vec& point, const Corners& triangle, double enough);
 
 struct Nearest {
   double squared = std::numeric_limits<double>::infinity();

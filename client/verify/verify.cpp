@@ -69,8 +69,9 @@ class Search {
   bool is_within(const Corners& piece) const {
     if (to_.surface().triangles.empty()) return false;
     const Corners near = to_.surface().corners(near_.triangle);
-    return std::ranges::all_of(
-        piece, [&](const Vec& p) { return squared_distance(p, near) <= most_ * most_; });
+    return std::ranges::all_of(piece, [&](const Vec& p) {
+      return squared_distance(p, near, most_ * most_) <= most_ * most_;
+    });
   }
 
   void note_farthest(const std::array<Vec, 4>& places, std::uint32_t triangle) {
@@ -143,13 +144,14 @@ class Verifier {
     std::unordered_set<std::uint32_t> met;
     for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) all.insert(component_of(t));
     for (const Nearest& near : there.nearest) {
-      if (near.squared <= question_.bound * question_.bound)
-        met.insert(component_of(near.triangle));
+      const bool is_near = near.squared <= question_.bound * question_.bound;
+      if (is_near) met.insert(component_of(near.triangle));
     }
     text_ << "The mesh has " << mesh_.surface().triangles.size() << " triangles, the surface "
           << surface.triangles.size() << " in " << all.size()
           << " components, of which the mesh comes near to " << met.size() << ".\n";
-    if (question_.some_parts) {
+    // Nothing at all is no part.
+    if (question_.some_parts && !met.empty()) {
       std::erase_if(back.findings, [&](const Finding& finding) {
         return !met.contains(component_of(finding.triangle));
       });
@@ -246,8 +248,8 @@ class Verifier {
       const Vec normal = normal_of(mesh.corners(t));
       const double side = dot(normal, normal_of(surface_.surface().corners(nearest[t].triangle)));
       if (side < 0) against.push_back(centre_of(mesh.corners(t)));
-      if (side != 0)
-        area[components[mesh.triangles[t][0]]] += std::copysign(std::sqrt(squared(normal)), side);
+      const double sign = side > 0 ? 1 : side < 0 ? -1 : 0;
+      area[components[mesh.triangles[t][0]]] += sign * std::sqrt(squared(normal));
     }
     for (std::size_t point = 0; point < area.size(); ++point) {
       if (area[point] < 0) inside_out.push_back(mesh.points[point]);

@@ -56,8 +56,8 @@ TEST_F(VerifyCommand, EndsWithStatusTwoWhereItCannotTell) {
     EXPECT_EQ(end.output, "");
   };
   expect_refused({}, "--bound is required");
-  expect_refused({"--bound", "0"}, "--bound");
-  expect_refused({"--bound", "nan"}, "--bound");
+  expect_refused({"--bound", "0"}, "must be positive");
+  expect_refused({"--bound", "nan"}, "must be positive");
   expect_refused({"--bound", "1", "--scheme", "7"}, "--scheme");
   expect_refused({"--bound", "1", "--crop", "90,0,0,91,1,1"}, "the box has no samples");
   expect_refused({"--bound", "1", "--crop", "1,2,3"}, "--crop");

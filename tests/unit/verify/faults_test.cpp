@@ -43,7 +43,7 @@ class VerifyFaults : public testing::Test {
   double distance(const Vec& point) const {
     double least = INFINITY;
     for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
-      least = std::min(least, verify::squared_distance(point, surface_.corners(t)));
+      least = std::min(least, verify::squared_distance(point, surface_.corners(t), least));
     }
     return std::sqrt(least);
   }

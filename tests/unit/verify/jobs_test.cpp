@@ -91,6 +91,8 @@ TEST(Verify, RejectsTheSurfaceOfAnotherField) {
 TEST(Verify, SaysWhenThereIsNothing) {
   MeshParameters parameters = parameters_within(0.05);
   EXPECT_FALSE(verdict({}, balls(), parameters).holds);
+  parameters.components.keep = 1;
+  EXPECT_FALSE(verdict({}, balls(), parameters).holds);
   parameters.iso = 1000;
   EXPECT_TRUE(verdict({}, balls(), parameters).holds);
 }
