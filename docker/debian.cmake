@@ -40,7 +40,7 @@ set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "adduser")
 set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
   ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm ${scripts}/conffiles)
 set(CPACK_COMPONENT_DAEMON_DESCRIPTION
-  "daemon that turns medical volumes into surface meshes\nisomeshd has an HTTP API and a web page. It reads DICOM, NIfTI, NRRD,\nMetaImage, VTK, TIFF and other files, ZIP and TAR archives of them, and raw\nsamples. It extracts and\nsmooths the surfaces of iso-values and labels, and writes Draco, GLB, STL, PLY,\nOBJ, 3MF, OFF, VTK, VTP and GIFTI files.\nThe package contains isomeshd and the programs that it runs: isomesh-import\nreads uploads, isomesh-job makes meshes, and isomesh-dimse sends and receives\nDICOM objects.")
+  "daemon that turns medical volumes into surface meshes\nisomeshd has an HTTP API and a web page. It reads DICOM, NIfTI, NRRD,\nMetaImage, VTK, TIFF and other files, ZIP and TAR archives of them, and raw\nsamples. It extracts and\nsmooths the surfaces of iso-values and labels, and writes Draco, GLB, STL, PLY,\nOBJ, 3MF, OFF, VTK, VTP and GIFTI files.\nThe package contains isomeshd and the programs that it runs: isomesh-import\nreads uploads, isomesh-job makes meshes, and isomesh-dimse sends and receives\nDICOM objects. isomesh-verify checks a mesh against its volume.")
 
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS isomeshd)

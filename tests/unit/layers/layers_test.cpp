@@ -88,6 +88,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/hospital/client", {"client/isomesh", "server/hospital/protocol"}},
     {"server/hospital/command", {"client/cli", "server/hospital/client"}},
     {"client", {"server/hospital/command"}},
+    {"client/verify", {"client/isomesh", "server/import/message"}},
 };
 
 // The layer that a folder is, or is a part of; empty for a folder that is in none.
@@ -149,6 +150,13 @@ TEST(Layers, IncludesPointDown) {
     ASSERT_FALSE(layer.empty()) << folder << " is in no layer; add it to the list";
     EXPECT_TRUE(may_include(layer, layer_of(included)))
         << file << " includes something of " << included;
+  }
+}
+
+// It checks what they make.
+TEST(Layers, TheCheckerSharesNothingWithTheKernels) {
+  for (const auto& [file, folder, included] : project_includes()) {
+    EXPECT_FALSE(is_in(folder, "client/verify") && is_in(included, "server/mesh")) << file;
   }
 }
 

@@ -1,0 +1,125 @@
+// Marching tetrahedra, a layer of cells after the other.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "client/verify/field.h"
+
+namespace isomesh::verify {
+namespace {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+
+// Corners of a cell are 0..7; their bits are the offsets along x, y and z.
+using Tetrahedron = std::array<unsigned, 4>;
+
+std::vector<Tetrahedron> split(int tetrahedra, bool is_odd) {
+  // Along the diagonal 0-7: one for each order of the axes.
+  if (tetrahedra == 6) {
+    return {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}};
+  }
+  if (is_odd) return {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 1, 2, 7}, {5, 1, 4, 7}, {6, 2, 4, 7}};
+  return {{0, 3, 5, 6}, {1, 0, 3, 5}, {2, 0, 3, 6}, {4, 0, 5, 6}, {7, 3, 5, 6}};
+}
+
+class March {
+ public:
+  March(const Field& field, const Cut& cut) : field_(field), cut_(cut) {}
+
+  Surface run() {
+    // The layer around a closed surface has the index -1.
+    const std::int64_t parity = cut_.close ? 1 : 0;
+    const std::array splits = {split(cut_.tetrahedra, false), split(cut_.tetrahedra, true)};
+    const auto& [nx, ny, nz] = field_.dims;
+    forget(0);
+    auto& [i, j, k] = cell_;
+    for (k = 0; k + 1 < nz; ++k) {
+      forget(k + 1);
+      for (j = 0; j + 1 < ny; ++j) {
+        for (i = 0; i + 1 < nx; ++i) {
+          unsigned inside = 0;
+          for (unsigned c = 0; c < 8; ++c) inside |= value(c) >= 0 ? 1U << c : 0;
+          if (inside == 0 || inside == 255) continue;
+          for (const Tetrahedron& t : splits.at((i + j + k + parity) & 1)) cut(t, inside);
+        }
+      }
+    }
+    return std::move(surface_);
+  }
+
+ private:
+  // The points on the edges of plane k, which the samples at their lower ends own.
+  std::vector<std::array<std::uint32_t, 8>>& points(std::int64_t k) { return points_[k & 1]; }
+  void forget(std::int64_t k) {
+    points(k).assign(static_cast<std::size_t>(field_.dims[0] * field_.dims[1]),
+                     {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone});
+  }
+
+  std::size_t in_plane(unsigned c) const {
+    return static_cast<std::size_t>((cell_[1] + (c >> 1 & 1)) * field_.dims[0] + cell_[0] +
+                                    (c & 1));
+  }
+  double value(unsigned c) const {
+    const auto plane = static_cast<std::size_t>(field_.dims[0] * field_.dims[1]);
+    const auto k = static_cast<std::size_t>(cell_[2] + (c >> 2));
+    const double f = field_.values[k * plane + in_plane(c)] - cut_.iso;
+    return !cut_.midpoint || std::isinf(f) ? f : f >= 0 ? 1 : -1;
+  }
+  Vec place(unsigned c) const {
+    const auto& [i, j, k] = cell_;
+    return field_.place({static_cast<double>(i + (c & 1)), static_cast<double>(j + (c >> 1 & 1)),
+                         static_cast<double>(k + (c >> 2))});
+  }
+
+  // The point where F is zero between an inside and an outside corner.
+  std::uint32_t crossing(unsigned inside, unsigned outside) {
+    const unsigned owner = inside & outside;
+    std::uint32_t& number = points(cell_[2] + (owner >> 2))[in_plane(owner)][inside ^ outside];
+    if (number == kNone) {
+      number = static_cast<std::uint32_t>(surface_.points.size());
+      const double share = value(inside) / (value(inside) - value(outside));
+      surface_.points.push_back(place(inside) + share * (place(outside) - place(inside)));
+    }
+    return number;
+  }
+
+  void cut(const Tetrahedron& corners, unsigned inside) {
+    std::vector<unsigned> in;
+    std::vector<unsigned> out;
+    for (const unsigned c : corners) ((inside >> c & 1) != 0 ? in : out).push_back(c);
+    if (in.empty() || out.empty()) return;
+    Indices first = {crossing(in[0], out[0]), 0, 0};
+    if (in.size() == 2) {
+      first = {first[0], crossing(in[0], out[1]), crossing(in[1], out[1])};
+      add({first[0], first[2], crossing(in[1], out[0])}, in[0], out[0]);
+    } else {
+      for (std::size_t n = 1; n < 3; ++n) {
+        first[n] = in.size() == 1 ? crossing(in[0], out[n]) : crossing(in[n], out[0]);
+      }
+    }
+    add(first, in[0], out[0]);
+  }
+
+  void add(Indices triangle, unsigned inside, unsigned outside) {
+    surface_.triangles.push_back(triangle);
+    const Vec normal = normal_of(surface_.corners(surface_.triangles.size() - 1));
+    if (dot(normal, place(outside) - place(inside)) >= 0) return;
+    std::swap(surface_.triangles.back()[1], surface_.triangles.back()[2]);
+  }
+
+  const Field& field_;
+  const Cut cut_;
+  Sample cell_ = {0, 0, 0};
+  std::array<std::vector<std::array<std::uint32_t, 8>>, 2> points_;
+  Surface surface_;
+};
+
+}  // namespace
+
+Surface zero_set(const Field& field, const Cut& cut) {
+  if (!cut.close) return March(field, cut).run();
+  const auto& [x, y, z] = field.dims;
+  return March(field.part({-1, -1, -1}, {x + 1, y + 1, z + 1}), cut).run();
+}
+
+}  // namespace isomesh::verify

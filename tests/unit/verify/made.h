@@ -1,0 +1,31 @@
+// What jobs make of synthetic volumes, and what isomesh-verify says of it.
+#pragma once
+
+#include <string>
+
+#include "client/verify/verify.h"
+#include "proto/parameters.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::test {
+
+// A job's only file. Vertices are not moved before they are simplified, unless `parameters` say so.
+std::string made(const SampleVolume<float>& volume, const MeshParameters& parameters);
+
+// An iso-value of 0, STL, max_error_mm.
+MeshParameters parameters_within(double bound);
+
+verify::Field field_of(const SampleVolume<float>& volume);
+
+// What is said of a mesh of a job with those parameters, within their max_error_mm; without one, of
+// the surface as it is extracted.
+verify::Verdict verdict(verify::Surface mesh, const SampleVolume<float>& volume,
+                        const MeshParameters& parameters);
+
+// Two balls, one of them hollow, in steps of half a millimetre.
+SampleVolume<float> balls();
+
+// A binary STL file.
+std::string stl_of(const verify::Surface& surface);
+
+}  // namespace isomesh::test
