@@ -30,43 +30,55 @@ class VertexChoice {
     words_.resize(high / kWordBits - first_word_ + 1);
     for (const std::uint32_t t : triangles) {
       for (const std::uint32_t v : all[t]) {
-        words_[v / kWordBits - first_word_].chosen |= std::uint64_t{1} << (v % kWordBits);
+        words_[v / kWordBits - first_word_].chosen |= std::uint32_t{1} << (v % kWordBits);
       }
     }
     for (Word& word : words_) {
       word.before = count_;
-      count_ += static_cast<std::uint32_t>(std::popcount(word.chosen));
+      count_ += bits_of(word.chosen);
     }
   }
 
   std::uint32_t count() const { return count_; }
 
-  // How many there are before `vertex`, chosen or not: a chosen one's number.
+  // The number of a vertex that is chosen.
+  std::uint32_t operator[](std::uint32_t vertex) const {
+    const Word& word = words_[vertex / kWordBits - first_word_];
+    return word.before + bits_of(word.chosen & ((std::uint32_t{1} << (vertex % kWordBits)) - 1));
+  }
+
+  // How many there are before `vertex`, chosen or not.
   std::uint32_t before(std::uint64_t vertex) const {
     const std::uint64_t at = vertex / kWordBits;
     if (at < first_word_) return 0;
     if (at >= first_word_ + words_.size()) return count_;
-    const Word& word = words_[at - first_word_];
-    const std::uint64_t lower = (std::uint64_t{1} << (vertex % kWordBits)) - 1;
-    return word.before + static_cast<std::uint32_t>(std::popcount(word.chosen & lower));
+    return (*this)[static_cast<std::uint32_t>(vertex)];
   }
 
   // In their order.
   template <class Visit>
   void visit(Visit visit) const {
     for (std::size_t w = 0; w < words_.size(); ++w) {
-      for (std::uint64_t rest = words_[w].chosen; rest != 0; rest &= rest - 1) {
+      for (std::uint32_t rest = words_[w].chosen; rest != 0; rest &= rest - 1) {
         visit((first_word_ + w) * kWordBits + static_cast<unsigned>(std::countr_zero(rest)));
       }
     }
   }
 
  private:
-  static constexpr std::uint64_t kWordBits = 64;
+  static constexpr std::uint32_t kWordBits = 32;
   struct Word {
-    std::uint64_t chosen = 0;
+    std::uint32_t chosen = 0;
     std::uint32_t before = 0;
   };
+
+  // As std::popcount, which is a call on processors that need not have the instruction.
+  static std::uint32_t bits_of(std::uint32_t set) {
+    set -= set >> 1 & 0x55555555;
+    set = (set & 0x33333333) + (set >> 2 & 0x33333333);
+    return ((set + (set >> 4)) & 0x0f0f0f0f) * 0x01010101 >> 24;
+  }
+
   std::uint64_t first_word_ = 0;
   std::vector<Word> words_;
   std::uint32_t count_ = 0;
@@ -143,8 +155,7 @@ void extract_label(const SeparatingSurface& surface, const LabelTriangles& trian
   for (std::size_t t = 0; t < own.size(); ++t) {
     const auto& [a, b, c] = from.triangles[own[t]];
     const bool is_inside_out = surface.parts.belongs(surface.sides[own[t]].front, number);
-    mesh.triangles[t] = {choice.before(a), choice.before(is_inside_out ? c : b),
-                         choice.before(is_inside_out ? b : c)};
+    mesh.triangles[t] = {choice[a], choice[is_inside_out ? c : b], choice[is_inside_out ? b : c]};
   }
   mesh.layer_triangles.clear();
   for (const std::uint64_t first : from.layer_triangles) {
