@@ -7,20 +7,18 @@
 #include <vector>
 
 #include "server/mesh/collapse/misses.h"
-#include "server/mesh/collapse/simplify.h"
 #include "server/mesh/measure/point_triangle.h"
 
 namespace isomesh::mesh::collapse {
 
 // The vertices and centres of the original triangles. Each is near a triangle that is left, whose
-// centre and middles of edges are near the original; both of the same wall. Where care is taken,
-// all points of triangles are. Triangles keep their numbers. Takes some 10 bytes a triangle. Thread
-// safe for different triangles.
+// centre and middles of edges are near the original; both of the same wall. Triangles keep their
+// numbers. Takes some 14 bytes a triangle. Thread safe for different triangles.
 class KeptPoints {
  public:
-  // `grids`: of the original; must outlive it. `care`: as SimplifyOptions.
+  // `grids`: of the original; must outlive it. `shares`: as SimplifyOptions.
   KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm,
-             std::span<const Care> care);
+             std::span<const float> shares);
 
   struct Shape {
     std::uint32_t triangle = 0;
@@ -32,18 +30,18 @@ class KeptPoints {
   bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes);
 
  private:
-  bool is_careful(std::uint32_t point) const;
-  bool is_near(const Shape& shape, bool at_all_points) const;
-  bool has_whole_triangle_near(std::uint32_t triangle, std::uint32_t home,
-                               std::span<const Shape> shapes) const;
+  // The squared distance that a point may have.
+  double limit_of(std::uint32_t point) const {
+    return shares_.empty() ? squared_mm_ : squared_mm_ * shares_[point] * shares_[point];
+  }
+  bool is_near(const Shape& shape) const;
   std::uint32_t home_of(std::uint32_t point, std::uint32_t triangle,
                         std::span<const Shape> shapes) const;
 
   const WalledSurface original_;
   const WallGrids& grids_;
-  const double max_error_mm_;
-  const double squared_mm_;  // of points that are samples
-  const std::span<const Care> care_;
+  const double squared_mm_;
+  std::vector<float> shares_;         // of each point; none if all are 1
   std::vector<std::uint32_t> first_;  // of each triangle
   std::vector<std::uint32_t> next_;   // of each point, of the same triangle
 };

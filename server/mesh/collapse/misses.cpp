@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
+#include <optional>
 
 #include "server/mesh/parallel.h"
 
@@ -35,68 +35,42 @@ double radius_around(const Point& centre, const Corners& piece) {
   return std::sqrt(most);
 }
 
-// The triangles of an index.
-class InGrid {
- public:
-  InGrid(const TriangleGrid& grid, std::uint32_t guess) : grid_(grid), guess_(guess) {}
-
-  // Also makes the one that is nearest the current one.
-  double distance_from(const Point& place) {
-    const TriangleGrid::Nearest nearest = grid_.nearest(place, guess_);
-    guess_ = nearest.triangle;
-    return std::sqrt(nearest.squared_mm);
-  }
-  bool has_current() const { return guess_ != TriangleGrid::kNone; }
-  Corners current() const { return corners_of(grid_.surface(), guess_); }
-  std::uint32_t guess() const { return guess_; }
-
- private:
-  const TriangleGrid& grid_;
-  std::uint32_t guess_;
-};
-
-// The same of a few triangles.
-class InList {
- public:
-  explicit InList(std::span<const Corners> triangles) : triangles_(triangles) {}
-
-  double distance_from(const Point& place) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t t = 0; t < triangles_.size(); ++t) {
-      const double squared = squared_distance(place, triangles_[t]);
-      if (!(squared < least)) continue;
-      least = squared;
-      current_ = t;
-    }
-    return std::sqrt(least);
-  }
-  bool has_current() const { return !triangles_.empty(); }
-  const Corners& current() const { return triangles_[current_]; }
-
- private:
-  const std::span<const Corners> triangles_;
-  std::size_t current_ = 0;
-};
-
 // Looks at one triangle after the other. Not thread safe.
-template <class Triangles>
 class Searcher {
  public:
-  Searcher(Triangles triangles, double within_mm)
-      : triangles_(triangles),
+  Searcher(const WalledSurface& from, const WallGrids& to, double within_mm)
+      : from_(from),
+        to_(to),
         within_(within_mm * (1 - kRounding)),
-        squared_within_(within_ * within_) {}
+        squared_within_(within_ * within_),
+        guesses_(to.walls(), TriangleGrid::kNone) {}
 
+  std::optional<Miss> look_at(std::uint32_t triangle) {
+    const Corners corners = corners_of(from_.view, triangle);
+    const std::size_t wall = to_.find(from_.sides_of(triangle));
+    if (wall == WallGrids::kNone) return Miss{triangle, centre_of(corners), centre_of(corners)};
+    grid_ = &to_.grid(wall);
+    guess_ = guesses_[wall];
+    farthest_mm_ = 0;
+    const bool is_all_near = is_near(corners);
+    guesses_[wall] = guess_;
+    if (is_all_near) return {};
+    return Miss{triangle, place_, centre_of(corners_of(grid_->surface(), nearest_))};
+  }
+
+ private:
   // Pieces that are too far may be many; the first tells enough.
   bool is_near(const Corners& piece) {
-    if (triangles_.has_current() && is_near_current(piece)) return true;
+    if (guess_ != TriangleGrid::kNone && is_near_guess(piece)) return true;
     const Point centre = centre_of(piece);
-    const double distance = triangles_.distance_from(centre);
+    const TriangleGrid::Nearest nearest = grid_->nearest(centre, guess_);
+    guess_ = nearest.triangle;
+    const double distance = std::sqrt(nearest.squared_mm);
     const double radius = radius_around(centre, piece);
-    if (distance + radius <= within_) return true;
-    if (triangles_.has_current() && is_near_current(piece)) return true;
-    if (distance > farthest_) {
-      farthest_ = distance;
+    if (distance + radius <= within_ || is_near_guess(piece)) return true;
+    if (distance >= farthest_mm_) {
+      farthest_mm_ = distance;
+      nearest_ = nearest.triangle;
       place_ = centre;
     }
     if (!(distance <= within_) || radius < kSmallest * within_) return false;
@@ -108,21 +82,22 @@ class Searcher {
            is_near({ca, bc, c});
   }
 
-  const Triangles& triangles() const { return triangles_; }
-  const Point& farthest_place() const { return place_; }
-
- private:
-  bool is_near_current(const Corners& piece) const {
-    const Corners other = triangles_.current();
+  bool is_near_guess(const Corners& piece) const {
+    const Corners other = corners_of(grid_->surface(), guess_);
     return std::ranges::all_of(piece, [&](const Point& corner) {
       return squared_distance(corner, other) <= squared_within_;
     });
   }
 
-  Triangles triangles_;
+  const WalledSurface& from_;
+  const WallGrids& to_;
   const double within_;
   const double squared_within_;
-  double farthest_ = 0;
+  std::vector<std::uint32_t> guesses_;  // by wall: what was near last
+  const TriangleGrid* grid_ = nullptr;
+  std::uint32_t guess_ = TriangleGrid::kNone;
+  double farthest_mm_ = 0;
+  std::uint32_t nearest_ = 0;  // to the place
   Point place_ = {0, 0, 0};
 };
 
@@ -158,33 +133,14 @@ std::size_t WallGrids::find(const WallSides& sides) const {
   return static_cast<std::size_t>(found - sides_.begin());
 }
 
-bool is_within(const Corners& triangle, const TriangleGrid& others, std::uint32_t guess,
-               double within_mm) {
-  return Searcher(InGrid(others, guess), within_mm).is_near(triangle);
-}
-
-bool is_within(const Corners& triangle, std::span<const Corners> others, double within_mm) {
-  return Searcher(InList(others), within_mm).is_near(triangle);
-}
-
 std::vector<Miss> find_misses(const WalledSurface& from, std::span<const std::uint32_t> which,
                               const WallGrids& to, double within_mm, const Context& context) {
   constexpr std::size_t kPerTask = 2048;
   std::vector<std::vector<Miss>> found(chunks_of(which.size(), kPerTask));
   const auto look = [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> guesses(to.walls(), TriangleGrid::kNone);  // what was near last
+    Searcher searcher(from, to, within_mm);
     for (const std::uint32_t t : which.subspan(begin, end - begin)) {
-      const Corners corners = corners_of(from.view, t);
-      const std::size_t wall = to.find(from.sides_of(t));
-      if (wall == WallGrids::kNone) {
-        found[begin / kPerTask].push_back({t, centre_of(corners)});
-        continue;
-      }
-      Searcher searcher(InGrid(to.grid(wall), guesses[wall]), within_mm);
-      if (!searcher.is_near(corners)) {
-        found[begin / kPerTask].push_back({t, searcher.farthest_place()});
-      }
-      guesses[wall] = searcher.triangles().guess();
+      if (const auto miss = searcher.look_at(t)) found[begin / kPerTask].push_back(*miss);
     }
   };
   for_chunks(context, which.size(), look, kPerTask);

@@ -55,15 +55,10 @@ class WallGrids {
   std::deque<TriangleGrid> grids_;
 };
 
-// True if all of the triangle is within the distance of some of the others; false also where pieces
-// of a thousandth of the distance do not tell. `guess`: as TriangleGrid::nearest.
-bool is_within(const Corners& triangle, const TriangleGrid& others, std::uint32_t guess,
-               double within_mm);
-bool is_within(const Corners& triangle, std::span<const Corners> others, double within_mm);
-
 struct Miss {
   std::uint32_t triangle = 0;
   Point place = {0, 0, 0};  // in it: the farthest that was found
+  Point near = {0, 0, 0};   // the centre of the triangle that is nearest to it
 };
 
 // Of the triangles `which` of `from`, in their order, those with a place that is farther than

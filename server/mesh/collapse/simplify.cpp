@@ -58,7 +58,7 @@ class Simplifier {
             [this](std::uint32_t v) { return place_of(v); }, scaled(extent_.high)) {
     std::iota(numbers_.begin(), numbers_.end(), 0U);
     if (original == nullptr) return;
-    points_.emplace(original->surface, original->grids, options.max_error_mm, options.care);
+    points_.emplace(original->surface, original->grids, options.max_error_mm, options.shares);
     around_.points = &*points_;
   }
 
@@ -209,7 +209,7 @@ class Simplifier {
   }
 
   bool is_held(std::uint32_t vertex) const {
-    return !options_.care.empty() && options_.care[vertex] == Care::kStays;
+    return !options_.shares.empty() && options_.shares[vertex] == 0;
   }
 
   const SimplifyOptions& options_;

@@ -17,12 +17,6 @@
 
 namespace isomesh::mesh {
 
-enum class Care : std::uint8_t {
-  kSamples,    // the error is first measured at some points
-  kAllPoints,  // it is always measured at all
-  kStays,      // the vertex stays, on junction curves too
-};
-
 struct SimplifyOptions {
   // No vertex and no centre of a triangle, of the surface as it was and as it becomes, is farther
   // than this from the other. Millimetres, more than 0. Infinite: nothing is measured.
@@ -32,8 +26,9 @@ struct SimplifyOptions {
   std::span<const Vec3> before = {};
   // Target triangle count. 0: as few as the error allows.
   std::uint64_t triangles = 0;
-  // The care that is taken near each vertex of the mesh. Empty: kSamples.
-  std::span<const Care> care = {};
+  // The share of the error that simplification may use near each vertex of the mesh. With 0 the
+  // vertex stays, on junction curves too. Empty: as large for all as serves best.
+  std::span<const float> shares = {};
 };
 
 struct SimplificationEffect {

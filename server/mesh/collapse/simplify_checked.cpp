@@ -20,7 +20,11 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr int kMostAttempts = 10;
+// The share of the error that is used at first. With less, there are more triangles; with more,
+// more triangles are beyond the error between the points where it is measured.
+constexpr float kFirstShare = 0.9F;
+constexpr float kTighter = 0.6F;  // what becomes of it around these
+constexpr int kMostAttempts = 12;
 
 // Makes proposals until one is within the error at all its points, and those of the surface. After
 // the first, it only looks at what has changed.
@@ -41,15 +45,15 @@ class Checker {
                   walls == nullptr ? std::span<const WallSides>() : walls->sides.span()},
         grids_(original_, quiet_),
         own_crossings_(crossings_of(mesh), edge_mm_),
-        care_(mesh.positions.size(), Care::kSamples) {
-    if (!options.care.empty()) care_.assign(options.care.begin(), options.care.end());
+        shares_(mesh.positions.size(), kFirstShare) {
+    if (!options.shares.empty()) shares_.assign(options.shares.begin(), options.shares.end());
     lost_.resize(mesh.triangles.size());
     std::iota(lost_.begin(), lost_.end(), 0U);
   }
 
   Proposal run() {
     SimplifyOptions options = options_;
-    options.care = care_;
+    options.shares = shares_;
     const Original original = {original_, grids_};
     for (int attempt = 1;; ++attempt) {
       const Context part =
@@ -60,7 +64,7 @@ class Checker {
         proposal.effect.is_within = beyond_.empty();
         return proposal;
       }
-      take_care();
+      tighten();
     }
   }
 
@@ -95,11 +99,15 @@ class Checker {
     const auto added = find_misses(proposed, fresh, grids_, options_.max_error_mm, quiet_);
     suspects_.clear();
     for (const Miss& miss : added) {
-      beyond_.push_back(box_of(proposed.view, proposed.view.triangles[miss.triangle]));
+      add_beyond(miss);
       suspects_.push_back(key_of(proposed, miss.triangle));
     }
     std::ranges::sort(suspects_);
     look_for_losses(proposed);
+  }
+
+  void add_beyond(const Miss& miss) {
+    for (const Point& place : {miss.place, miss.near}) beyond_.push_back({place, place});
   }
 
   // The triangles that are not known to be within the error. Also remembers all, and boxes of what
@@ -161,19 +169,19 @@ class Checker {
     lost_.clear();
     for (const Miss& miss : find_misses(original_, which, grids, options_.max_error_mm, quiet_)) {
       lost_.push_back(miss.triangle);
-      beyond_.push_back(box_of(original_.view, original_.view.triangles[miss.triangle]));
+      add_beyond(miss);
     }
   }
 
-  // Around the triangles that are beyond the error, and where others cross.
-  void take_care() {
+  // Leaves less of the error around what is beyond it, and no vertex goes where others cross.
+  void tighten() {
     const MarkedCubes beyond(beyond_, edge_mm_ / 2);
     const MarkedCubes crossings(crossings_, edge_mm_ / 2);
-    for_each(quiet_, care_.size(), [&](std::size_t v) {
+    for_each(quiet_, shares_.size(), [&](std::size_t v) {
       const Point place = to_point(mesh_.positions[v]);
       const Box box = {place, place};
-      if (beyond.are_near(box)) care_[v] = std::max(care_[v], Care::kAllPoints);
-      if (crossings.are_near(box)) care_[v] = Care::kStays;
+      if (beyond.are_near(box)) shares_[v] *= kTighter;
+      if (crossings.are_near(box)) shares_[v] = 0;
     });
   }
 
@@ -206,12 +214,12 @@ class Checker {
   const WalledSurface original_;
   const WallGrids grids_;            // of it
   const MarkedCubes own_crossings_;  // of the mesh with itself
-  std::vector<Care> care_;           // near each vertex
+  std::vector<float> shares_;        // of the error, near each vertex
   std::vector<Key> known_;           // of the triangles of the last proposal, in order
   std::vector<Key> suspects_;        // those beyond the error, in order
   std::vector<Box> changed_;
   std::vector<std::uint32_t> lost_;  // original triangles beyond the error; in order
-  std::vector<Box> beyond_;          // around triangles beyond the error
+  std::vector<Box> beyond_;          // places beyond the error
   std::vector<Box> crossings_;       // where others cross each other newly
 };
 

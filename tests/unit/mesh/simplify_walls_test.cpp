@@ -115,18 +115,18 @@ TEST(SimplifyWalls, LeaveEachLabelASurfaceWhateverTheNumber) {
 TEST(SimplifyWalls, KeepHeldVertices) {
   const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
   const SeparatingSurface original = smooth_cells(4, options);
-  std::vector<Care> care(original.mesh.positions.size(), Care::kSamples);
+  std::vector<float> shares(original.mesh.positions.size(), 1);
   std::vector<Vec3> places;
   std::size_t on_line = 0;
-  for (std::size_t v = 0; v < care.size(); v += 7) {
-    care[v] = Care::kStays;
+  for (std::size_t v = 0; v < shares.size(); v += 7) {
+    shares[v] = 0;
     places.push_back(original.mesh.positions[v]);
     on_line += original.mesh.is_on_line(v) ? 1 : 0;
   }
   EXPECT_GT(on_line, 10U);
   for (const bool is_measured : {false, true}) {
     SeparatingSurface surface = smooth_cells(4, options);
-    SimplifyOptions simplification = {.care = care};
+    SimplifyOptions simplification = {.shares = shares};
     if (is_measured) simplification.max_error_mm = 0.3;
     if (!is_measured) simplification.triangles = 4;
     EXPECT_EQ(simplify(simplification, {}, surface).is_least, !is_measured);
