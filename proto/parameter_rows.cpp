@@ -323,11 +323,9 @@ constinit const Parameter kMaxErrorMm = {
         "The distance between each file and the extracted surface is at "
         "most this.",
     .more =
-        "In millimetres, in both directions. It is proven for every point "
-        "where that can be done, and measured otherwise: at all vertices "
-        "and the centres of all triangles, so other points may be farther "
-        "away. `mesh.certificate` says which, see `certify`, which is "
-        "switched on. Smoothing may use half of it. Simplification then "
+        "In millimetres, in both directions. It is proven for every point; "
+        "if that cannot be done, `mesh.certificate` says so. See `certify`, "
+        "which is switched on. Smoothing may use half of it. Simplification then "
         "removes as many triangles as the rest allows, and Draco's "
         "coordinates get as many bits as that takes.",
     .unit = "mm",
