@@ -38,7 +38,7 @@ void add_points(Surface& surface, std::string_view bytes) {
   }
 }
 
-// Of the last three points.
+// Its corners are the last three points.
 void add_triangle(Surface& surface) {
   const auto end = static_cast<std::uint32_t>(surface.points.size());
   surface.triangles.push_back({end - 3, end - 2, end - 1});

@@ -33,7 +33,7 @@ double largest_difference(const Lattice<T>& lattice, double iso) {
 // The points at the ends of a sample's edges, by direction or slot, as offsets from the sample.
 using EdgeOffsets = std::array<std::array<std::ptrdiff_t, 2>, kBccSlots>;
 
-// Of a sample of odd i+j+k or not. Its edges lie in the cell whose corner 0 it is.
+// For a sample of odd i+j+k or not. Its edges lie in the cell whose corner 0 it is.
 EdgeOffsets edges_of(const Field& field, bool is_odd) {
   EdgeOffsets edges = {};
   const CellSplit& split = cell_split(field.scheme, is_odd);
@@ -44,7 +44,7 @@ EdgeOffsets edges_of(const Field& field, bool is_odd) {
   return edges;
 }
 
-// Of a sample whose cell has a centre, or has none.
+// For a sample whose cell has a centre, or has none.
 EdgeOffsets bcc_edges_of(const Field& field, bool has_centre) {
   EdgeOffsets edges = {};
   for (const unsigned direction : {1U, 2U, 4U, 3U, 5U, 6U, 7U}) {

@@ -32,7 +32,7 @@ struct Field {
   Dims dims;                 // with the layers around the volume
   std::uint32_t margin = 0;  // how many those are on each side
   Scheme scheme = Scheme::kSix;
-  // Of each point: first those of the samples, and one layer more, which is read with a weight of
+  // One for each point: first those of the samples, and one layer more, read with a weight of
   // zero. The centre of the cell whose corner 0 is sample s is point s + first_centre.
   std::vector<float> values;
   std::uint32_t first_centre = ~std::uint32_t{0};

@@ -25,7 +25,7 @@ class KeptPoints {
     mesh::Corners corners;
   };
 
-  // Whether these shapes may come instead of the triangles of the `star`, some of which they are.
+  // True if these shapes may come instead of the triangles of the `star`, some of which they are.
   // If so, the points of these are theirs, each one's of its own wall.
   bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes);
 

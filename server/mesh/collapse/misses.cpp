@@ -1,6 +1,7 @@
 #include "server/mesh/collapse/misses.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -11,28 +12,76 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr double kSmallest = 1e-3;  // of the distance: the radius of a piece that is not cut
-constexpr double kRounding = 1e-9;  // more than what double precision loses, as a share
+constexpr double kRounding = 1e-9;  // more than what double precision loses: a share,
+constexpr double kRoundingMm = 1e-11;
+constexpr int kMostCuts = 80;            // on the way to a piece
+constexpr double kLeastSide = 1e-3;      // of a piece's radius: what a cut leaves on each side
+constexpr std::size_t kManyCorners = 8;  // of a piece: it is cut in its middle
+constexpr std::size_t kMostCorners = 16;
 
 std::uint32_t key_of(const WallSides& sides) {
   return std::uint32_t{sides.front} << 16 | sides.back;
 }
 
-Point middle_of(const Point& a, const Point& b) {
-  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
-}
-
-Point centre_of(const Corners& piece) {
-  const auto& [a, b, c] = piece;
+Point centre_of(const Corners& triangle) {
+  const auto& [a, b, c] = triangle;
   return {(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3, (a[2] + b[2] + c[2]) / 3};
 }
 
-double radius_around(const Point& centre, const Corners& piece) {
-  double most = 0;
-  for (const Point& corner : piece) {
-    const Point way = minus(corner, centre);
-    most = std::max(most, dot(way, way));
+struct Plane {
+  Point normal = {0, 0, 0};  // a unit vector
+  double offset = 0;
+
+  double height_of(const Point& place) const { return dot(normal, place) - offset; }
+};
+
+Plane plane_at(const Point& place, const Point& direction) {
+  const double length = std::sqrt(dot(direction, direction));
+  if (!(length > 0)) return {};
+  const Point normal = {direction[0] / length, direction[1] / length, direction[2] / length};
+  return {normal, dot(normal, place)};
+}
+
+// A convex polygon: a part of a triangle. One of kMostCorners may have lost some.
+struct Piece {
+  std::array<Point, kMostCorners> corners;
+  std::size_t size = 0;
+
+  explicit Piece(std::span<const Point> its_corners) {
+    for (const Point& corner : its_corners) add(corner);
   }
-  return std::sqrt(most);
+  Piece() = default;
+
+  void add(const Point& corner) {
+    if (size < kMostCorners) corners[size++] = corner;
+  }
+  std::span<const Point> span() const { return std::span(corners).first(size); }
+
+  Point centre() const {
+    Point sum = {0, 0, 0};
+    for (const Point& corner : span()) sum = plus(sum, corner);
+    const auto count = static_cast<double>(size);
+    return {sum[0] / count, sum[1] / count, sum[2] / count};
+  }
+};
+
+// The parts below and above a plane.
+std::array<Piece, 2> cut(const Piece& piece, const Plane& plane) {
+  std::array<Piece, 2> parts;
+  for (std::size_t i = 0; i < piece.size; ++i) {
+    const Point& from = piece.corners[i];
+    const Point& to = piece.corners[i + 1 < piece.size ? i + 1 : 0];
+    const double begin = plane.height_of(from);
+    const double end = plane.height_of(to);
+    if (begin <= 0) parts[0].add(from);
+    if (begin >= 0) parts[1].add(from);
+    if (!(begin < 0 && end > 0) && !(begin > 0 && end < 0)) continue;
+    const double share = begin / (begin - end);
+    const Point way = minus(to, from);
+    const Point at = plus(from, {way[0] * share, way[1] * share, way[2] * share});
+    for (Piece& part : parts) part.add(at);
+  }
+  return parts;
 }
 
 // Looks at one triangle after the other. Not thread safe.
@@ -41,7 +90,7 @@ class Searcher {
   Searcher(const WalledSurface& from, const WallGrids& to, double within_mm)
       : from_(from),
         to_(to),
-        within_(within_mm * (1 - kRounding)),
+        within_(within_mm * (1 - kRounding) - kRoundingMm),
         squared_within_(within_ * within_),
         guesses_(to.walls(), TriangleGrid::kNone) {}
 
@@ -52,7 +101,7 @@ class Searcher {
     grid_ = &to_.grid(wall);
     guess_ = guesses_[wall];
     farthest_mm_ = 0;
-    const bool is_all_near = is_near(corners);
+    const bool is_all_near = is_near(Piece(corners), 0);
     guesses_[wall] = guess_;
     if (is_all_near) return {};
     return Miss{triangle, place_, centre_of(corners_of(grid_->surface(), nearest_))};
@@ -60,33 +109,62 @@ class Searcher {
 
  private:
   // Pieces that are too far may be many; the first tells enough.
-  bool is_near(const Corners& piece) {
+  bool is_near(const Piece& piece, int cuts) {
+    if (piece.size == kMostCorners) return false;
     if (guess_ != TriangleGrid::kNone && is_near_guess(piece)) return true;
-    const Point centre = centre_of(piece);
+    const Point centre = piece.centre();
     const TriangleGrid::Nearest nearest = grid_->nearest(centre, guess_);
     guess_ = nearest.triangle;
     const double distance = std::sqrt(nearest.squared_mm);
-    const double radius = radius_around(centre, piece);
+    Point longest = {0, 0, 0};
+    for (const Point& corner : piece.span()) {
+      const Point way = minus(corner, centre);
+      if (dot(way, way) > dot(longest, longest)) longest = way;
+    }
+    const double radius = std::sqrt(dot(longest, longest));
     if (distance + radius <= within_ || is_near_guess(piece)) return true;
     if (distance >= farthest_mm_) {
       farthest_mm_ = distance;
       nearest_ = nearest.triangle;
       place_ = centre;
     }
-    if (!(distance <= within_) || radius < kSmallest * within_) return false;
-    const auto& [a, b, c] = piece;
-    const Point ab = middle_of(a, b);
-    const Point bc = middle_of(b, c);
-    const Point ca = middle_of(c, a);
-    return is_near({ab, bc, ca}) && is_near({a, ab, ca}) && is_near({ab, b, bc}) &&
-           is_near({ca, bc, c});
+    if (!(distance <= within_) || radius < kSmallest * within_ || cuts == kMostCuts) return false;
+    Plane plane = plane_beside_guess(piece, kLeastSide * radius);
+    if (plane.normal == Point{0, 0, 0} || piece.size >= kManyCorners) {
+      plane = plane_at(centre, longest);
+    }
+    const auto [below, above] = cut(piece, plane);
+    return is_near(below, cuts + 1) && is_near(above, cuts + 1);
   }
 
-  bool is_near_guess(const Corners& piece) const {
+  bool is_near_guess(const Piece& piece) const {
     const Corners other = corners_of(grid_->surface(), guess_);
-    return std::ranges::all_of(piece, [&](const Point& corner) {
+    return std::ranges::all_of(piece.span(), [&](const Point& corner) {
       return squared_distance(corner, other) <= squared_within_;
     });
+  }
+
+  // A plane through an edge of the guess, upright on it: with what is above it, the piece reaches
+  // farthest beyond the guess. None if all are below, or hardly anything is on one side.
+  Plane plane_beside_guess(const Piece& piece, double least) const {
+    const Corners guess = corners_of(grid_->surface(), guess_);
+    const Point normal = normal_of(guess[0], guess[1], guess[2]);
+    Plane best;
+    double farthest = least;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Plane plane = plane_at(guess[i], cross(minus(guess[(i + 1) % 3], guess[i]), normal));
+      double low = 0;
+      double high = 0;
+      for (const Point& corner : piece.span()) {
+        const double height = plane.height_of(corner);
+        low = std::min(low, height);
+        high = std::max(high, height);
+      }
+      if (low > -least || high <= farthest) continue;
+      farthest = high;
+      best = plane;
+    }
+    return best;
   }
 
   const WalledSurface& from_;

@@ -1,10 +1,11 @@
 // Finds where a surface is farther than a distance from another, at any of its points; private to
 // the kernels.
 //
-// A triangle is within the distance of another one if its corners are, since a distance from a
-// convex set is convex. And where a place is so much nearer than asked, all places around it are
-// near enough, since a distance changes no faster than the place. A triangle of which neither tells
-// enough is cut in four.
+// A part of a triangle is within the distance of another triangle if its corners are, since a
+// distance from a convex set is convex. And where a place is so much nearer than asked, all places
+// around it are near enough, since a distance changes no faster than the place. A part of which
+// neither tells enough is cut in two: where it reaches beyond the nearest triangle, or in its
+// middle.
 #pragma once
 
 #include <cstddef>
@@ -61,10 +62,10 @@ struct Miss {
   Point near = {0, 0, 0};   // the centre of the triangle that is nearest to it
 };
 
-// Of the triangles `which` of `from`, in their order, those with a place that is farther than
-// `within_mm`, which is more than 0, from the same wall of `to`; and those for which pieces of a
-// thousandth of the distance do not tell. So if there are none, all places are near enough. The
-// same for any number of threads. Throws Error kCancelled.
+// The misses among the triangles `which` of `from`, in their order: those with a place that is
+// farther than `within_mm`, which is more than 0, from the same wall of `to`, and those for which
+// pieces of a thousandth of the distance do not tell. So if there are none, all places are near
+// enough. The same for any number of threads. Throws Error kCancelled.
 std::vector<Miss> find_misses(const WalledSurface& from, std::span<const std::uint32_t> which,
                               const WallGrids& to, double within_mm, const Context& context);
 

@@ -11,14 +11,14 @@
 
 namespace isomesh::mesh {
 
-// What a surface becomes: triangles between its vertices, and their sides if it has walls.
+// A simplified surface: triangles between its vertices, and their sides if it has walls.
 struct Proposal {
   SimplificationEffect effect;
   std::vector<Triangle> triangles;
   std::vector<WallSides> sides;
 };
 
-// What the error is measured from.
+// The surface that the error is measured from.
 struct Original {
   const WalledSurface& surface;
   const WallGrids& grids;

@@ -23,10 +23,11 @@ using collapse::Vecd;
 using collapse::Vecf;
 
 constexpr int kMostRounds = 12;
-// Of the triangles: what a round leaves at least. Seams stay in a round, so triangles beside them
-// would become much smaller than the others.
+// The share of the triangles that a round leaves at least. Seams stay in a round, so triangles
+// beside them would become much smaller than the others.
 constexpr double kLeastShare = 0.25;
-// Of the target: what blocks leave for the whole surface, where the least of all edges goes first.
+// The share of the target that blocks leave for the whole surface, where the least of all edges
+// goes first.
 constexpr double kForTheWhole = 1.5;
 constexpr double kMostCubesPerAxis = 64;
 constexpr CubeCut kWhole = {std::numeric_limits<float>::infinity(), false, false};

@@ -91,7 +91,7 @@ class Simplifier : private Collapser<Simplifier> {
     return true;
   }
 
-  // Whether a triangle may become this one, which had a corner at `before` instead of its first.
+  // True if a triangle may become this one, which had a corner at `before` instead of its first.
   bool is_upright(const Point& before, const mesh::Corners& corners) const {
     const Point normal = normal_of(corners[0], corners[1], corners[2]);
     if (may_turn_) return normal != Point{0, 0, 0};

@@ -35,7 +35,13 @@ MarkedCubes::MarkedCubes(std::span<const Box> boxes, double reach_mm) : reach_mm
   for (std::size_t axis = 0; axis < 3; ++axis) {
     longest = std::max(longest, all.high[axis] - all.low[axis]);
   }
-  side_mm_ = std::max({2 * reach_mm, longest / (kMostCubes - 1), 1e-12});
+  // Smaller cubes than the boxes would be too many to mark.
+  double sum = 0;
+  for (const Box& box : boxes) {
+    sum += std::max({box.high[0] - box.low[0], box.high[1] - box.low[1], box.high[2] - box.low[2]});
+  }
+  const double mean = sum / static_cast<double>(boxes.size());
+  side_mm_ = std::max({2 * reach_mm, longest / (kMostCubes - 1), mean, 1e-12});
   for (std::size_t axis = 0; axis < 3; ++axis) {
     count_[axis] = static_cast<std::size_t>((all.high[axis] - all.low[axis]) / side_mm_) + 1;
   }
@@ -49,6 +55,7 @@ MarkedCubes::MarkedCubes(std::span<const Box> boxes, double reach_mm) : reach_mm
 }
 
 bool MarkedCubes::are_near(const Box& box) const {
+  if (is_marked_.empty()) return false;
   return visit(around(box), [&](std::size_t cube) { return bool{is_marked_[cube]}; });
 }
 

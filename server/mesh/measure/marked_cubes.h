@@ -1,4 +1,4 @@
-// What lies near some boxes; private to the kernels.
+// Cubes near some boxes; private to the kernels.
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ class MarkedCubes {
   double reach_mm_;
   Point low_ = {0, 0, 0};
   double side_mm_ = 1;
-  Cube count_ = {0, 0, 0};
+  Cube count_ = {1, 1, 1};
   std::vector<bool> is_marked_;
 };
 

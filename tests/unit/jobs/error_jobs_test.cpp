@@ -128,7 +128,30 @@ TEST_F(ErrorJobsTest, AreProvenWithEachScheme) {
   }
 }
 
-// If the error cannot be proven, it is measured, and the certificate says why.
+TEST_F(ErrorJobsTest, AreProvenWithoutSomeComponents) {
+  const auto components_of = [&](auto change) {
+    JobParameters parameters = parameters_of(volume_, 0);
+    parameters.max_error_mm = 0.1;
+    parameters.certify = true;
+    change(parameters);
+    const MeshSummary mesh = run(parameters);
+    EXPECT_TRUE(mesh.certificate->bound_mm) << mesh.certificate->why_unproven.value_or("");
+    EXPECT_LE(mesh.certificate->bound_mm.value_or(1), 0.1);
+    EXPECT_LE(mesh.certificate->found_mm, mesh.certificate->bound_mm.value_or(0));
+    EXPECT_EQ(mesh.quality.self_intersections->pairs, 0U);
+    return mesh.components;
+  };
+  EXPECT_EQ(components_of([](auto& job) { job.components.keep = 1; }), 1U);
+  EXPECT_EQ(components_of([](auto& job) { job.fill_cavities = true; }), 2U);
+  EXPECT_EQ(components_of([](auto& job) {
+              job.fill_cavities = true;
+              job.components.keep = 1;
+              job.passes = 5;
+            }),
+            1U);
+}
+
+// If the error cannot be proven, the certificate says why.
 TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
   const auto why = [&](auto change) {
     JobParameters parameters = parameters_of(volume_, 0);

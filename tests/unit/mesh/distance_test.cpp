@@ -282,7 +282,7 @@ TEST(Distance, OfManyPointsIsMeasuredAtRunsOfThem) {
   EXPECT_EQ(measure_distance(from, grid, {}, all.points), all);
 }
 
-// Where the reach is too small, all is looked at.
+// All is looked at where the reach is too small.
 TEST(Distance, OfFewPointsIsTheSameWhateverTheReach) {
   const Mesh a = ball(0.95, 60);
   const Mesh b = ball(0.93, 55);

@@ -1,4 +1,4 @@
-// What jobs make of synthetic volumes, and what isomesh-verify says of it.
+// Jobs of synthetic volumes, and isomesh-verify's word on them.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ MeshParameters parameters_within(double bound);
 
 verify::Field field_of(const SampleVolume<float>& volume);
 
-// What is said of a mesh of a job with those parameters, within their max_error_mm; without one, of
+// The answer for a mesh of a job with those parameters, within their max_error_mm; without one, of
 // the surface as it is extracted.
 verify::Verdict verdict(verify::Surface mesh, const SampleVolume<float>& volume,
                         const MeshParameters& parameters);

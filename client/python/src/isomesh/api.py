@@ -466,11 +466,10 @@ class JobOptions(_Parameters, total=False):
 
     max_error_mm
         The distance between each file and the extracted surface is at most this. In
-        millimetres, in both directions. It is proven for every point where that can be done,
-        and measured otherwise: at all vertices and the centres of all triangles, so other
-        points may be farther away. mesh.certificate says which, see certify, which is switched
-        on. Smoothing may use half of it. Simplification then removes as many triangles as the
-        rest allows, and Draco's coordinates get as many bits as that takes.
+        millimetres, in both directions. It is proven for every point; if that cannot be done,
+        mesh.certificate says so. See certify, which is switched on. Smoothing may use half of
+        it. Simplification then removes as many triangles as the rest allows, and Draco's
+        coordinates get as many bits as that takes.
 
     triangles
         Simplify the surface to at most this many triangles. If max_error_mm is given too, the
