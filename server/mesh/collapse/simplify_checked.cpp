@@ -76,7 +76,7 @@ class Checker {
 
   static Key key_of(const WalledSurface& surface, std::uint32_t t) {
     Triangle triangle = surface.view.triangles[t];
-    std::ranges::rotate(triangle, std::ranges::min_element(triangle));
+    std::rotate(triangle.begin(), std::ranges::min_element(triangle), triangle.end());
     const WallSides sides = surface.sides_of(t);
     return {triangle[0], triangle[1], triangle[2], std::uint32_t{sides.front} << 16 | sides.back};
   }
