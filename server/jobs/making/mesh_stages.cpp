@@ -170,6 +170,7 @@ void simplify_stage(const SampleArray& samples, const MeshRequest& request,
   }
   set_extent(measure_extent(mesh, progress.quiet()), summary);
 }
+
 void measure_final_shapes(const MeshParameters& parameters, const Progress& progress,
                           const mesh::Mesh& mesh, MeshQuality& quality) {
   if (parameters.passes == 0 && !is_simplified(parameters)) return;

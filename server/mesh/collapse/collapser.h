@@ -92,9 +92,11 @@ class Collapser {
   // At least that of both at one of their places.
   float cost(std::uint32_t a, std::uint32_t b) const {
     const Vecf d = way(a, b);
-    const float at_b = nodes_[a].quadric.at(d) + nodes_[b].quadric.c;
+    // Rounding makes c negative where there is no cost.
+    const float at_b = std::max(0.0F, nodes_[a].quadric.at(d) + nodes_[b].quadric.c);
     if (!Own::kMovesTheOther || stays(b)) return at_b;
-    return std::min(at_b, nodes_[b].quadric.at(d * -1.0F) + nodes_[a].quadric.c);
+    const float at_a = nodes_[b].quadric.at(d * -1.0F) + nodes_[a].quadric.c;
+    return std::min(at_b, std::max(0.0F, at_a));
   }
 
   int bucket_of(std::uint32_t a, float cost) const {

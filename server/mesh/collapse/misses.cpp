@@ -12,8 +12,9 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr double kSmallest = 1e-3;  // of the distance: the radius of a piece that is not cut
-constexpr double kRounding = 1e-9;  // more than what double precision loses: a share,
-constexpr double kRoundingMm = 1e-11;
+// More than what double precision loses, of distances from needles too: a share, and millimetres.
+constexpr double kRounding = 1e-6;
+constexpr double kRoundingMm = 1e-7;
 constexpr int kMostCuts = 80;            // on the way to a piece
 constexpr double kLeastSide = 1e-3;      // of a piece's radius: what a cut leaves on each side
 constexpr std::size_t kManyCorners = 8;  // of a piece: it is cut in its middle
@@ -97,14 +98,17 @@ class Searcher {
   std::optional<Miss> look_at(std::uint32_t triangle) {
     const Corners corners = corners_of(from_.view, triangle);
     const std::size_t wall = to_.find(from_.sides_of(triangle));
-    if (wall == WallGrids::kNone) return Miss{triangle, centre_of(corners), centre_of(corners)};
+    if (wall == WallGrids::kNone) {
+      return Miss{triangle, centre_of(corners), box_of(from_.view, from_.view.triangles[triangle])};
+    }
     grid_ = &to_.grid(wall);
     guess_ = guesses_[wall];
     farthest_mm_ = 0;
     const bool is_all_near = is_near(Piece(corners), 0);
     guesses_[wall] = guess_;
     if (is_all_near) return {};
-    return Miss{triangle, place_, centre_of(corners_of(grid_->surface(), nearest_))};
+    const SurfaceView& others = grid_->surface();
+    return Miss{triangle, place_, box_of(others, others.triangles[nearest_])};
   }
 
  private:

@@ -7,8 +7,7 @@
 //  * five-way: x, y, z, (x+y+z)/2, (-x+y+z)/2, (x-y+z)/2, (x+y-z)/2, counted from a sample of even
 //    i+j+k, and lines in 9 directions: along the axes, and through even samples along the diagonals
 //    of faces;
-//  * body-centred: u = y+z, v = x+z, w = x+y, u-v, v-w, u-w, and lines in 7 directions. All three
-//  of
+//  * body-centred: u = y+z, v = x+z, w = x+y, u-v, v-w, u-w, and lines in 7 directions. All of
 //    u, v and w are whole at samples and at centres alone, and the tetrahedra are the six-way ones
 //    between them. Cells with a phantom are split in six, and so are faces at the border: x, y, z,
 //    and lines in 3 more directions, along the diagonals of faces.

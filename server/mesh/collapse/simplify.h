@@ -1,10 +1,10 @@
-// Fewer triangles for a surface, within a distance of it that is measured.
+// Fewer triangles for a surface, within a distance of it.
 //
 // Edges collapse in the order of their quadrics (M. Garland, P. S. Heckbert, "Surface
 // simplification using quadric error metrics", SIGGRAPH 1997). A vertex is drawn into a neighbour,
-// so vertices are removed but never moved. A quadric is no distance. So before each collapse its
-// place is measured against the original surface in both directions, and the link condition is
-// checked.
+// so vertices are removed but never moved. A quadric is no distance. So before each collapse some
+// points are measured against the original surface in both directions, and the link condition is
+// checked. In the end all points are looked at (misses.h).
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@ namespace isomesh::mesh {
 
 struct SimplifyOptions {
   // No vertex and no centre of a triangle, of the surface as it was and as it becomes, is farther
-  // than this from the other. Millimetres, more than 0. Infinite: nothing is measured.
+  // than this from the other, and no point at all if the effect says so. Millimetres, more than 0.
+  // Infinite: nothing is measured.
   double max_error_mm = std::numeric_limits<double>::infinity();
   // The vertex positions before they were moved, in the mesh's order. The error is measured from
   // that surface. Empty: the current positions. No vertex may have moved farther than the error.

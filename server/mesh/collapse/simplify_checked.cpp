@@ -44,7 +44,7 @@ class Checker {
                    mesh.triangles.span()},
                   walls == nullptr ? std::span<const WallSides>() : walls->sides.span()},
         grids_(original_, quiet_),
-        own_crossings_(crossings_of(mesh), edge_mm_),
+        own_crossings_(own_crossings(), edge_mm_),
         shares_(mesh.positions.size(), kFirstShare) {
     if (!options.shares.empty()) shares_.assign(options.shares.begin(), options.shares.end());
     lost_.resize(mesh.triangles.size());
@@ -64,7 +64,7 @@ class Checker {
         proposal.effect.is_within = beyond_.empty();
         return proposal;
       }
-      tighten();
+      tighten(attempt + 2 < kMostAttempts ? kTighter : 0);
     }
   }
 
@@ -81,11 +81,13 @@ class Checker {
     return {triangle[0], triangle[1], triangle[2], std::uint32_t{sides.front} << 16 | sides.back};
   }
 
-  std::vector<Box> crossings_of(const SurfaceView& surface) const {
+  std::vector<IntersectingPair> crossings_of(const SurfaceView& surface) const {
+    return find_self_intersections(surface, quiet_, kAll).places;
+  }
+  std::vector<Box> own_crossings() const {
     std::vector<Box> boxes;
-    for (const IntersectingPair& pair : find_self_intersections(surface, quiet_, kAll).places) {
+    for (const IntersectingPair& pair : crossings_of(mesh_))
       boxes.push_back({pair.place, pair.place});
-    }
     return boxes;
   }
 
@@ -95,23 +97,25 @@ class Checker {
     beyond_.clear();
     crossings_.clear();
     const std::vector<std::uint32_t> fresh = find_fresh(proposed);
+    suspects_.clear();
     look_for_crossings(proposed, fresh);
     const auto added = find_misses(proposed, fresh, grids_, options_.max_error_mm, quiet_);
-    suspects_.clear();
     for (const Miss& miss : added) {
-      add_beyond(miss);
+      add_beyond(miss, miss.near);
       suspects_.push_back(key_of(proposed, miss.triangle));
     }
     std::ranges::sort(suspects_);
     look_for_losses(proposed);
   }
 
-  void add_beyond(const Miss& miss) {
-    for (const Point& place : {miss.place, miss.near}) beyond_.push_back({place, place});
+  // `original`: around the original triangle that is at fault, or is nearest to it.
+  void add_beyond(const Miss& miss, const Box& original) {
+    beyond_.push_back({miss.place, miss.place});
+    beyond_.push_back(original);
   }
 
-  // The triangles that are not known to be within the error. Also remembers all, and boxes of what
-  // is new and of what is gone.
+  // The triangles that are not known to be within the error and apart from others. Also remembers
+  // all, and boxes of what is new and of what is gone.
   std::vector<std::uint32_t> find_fresh(const WalledSurface& proposed) {
     std::vector<std::pair<Key, std::uint32_t>> all(proposed.view.triangles.size());
     for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = {key_of(proposed, t), t};
@@ -145,8 +149,13 @@ class Checker {
       boxes.push_back(box_of(proposed.view, proposed.view.triangles[t]));
     }
     const Part near(proposed, MarkedCubes(boxes, 0));
-    for (const Box& crossing : crossings_of(near.surface().view)) {
-      if (!own_crossings_.are_near(crossing)) crossings_.push_back(crossing);
+    for (const IntersectingPair& pair : crossings_of(near.surface().view)) {
+      const Box place = {pair.place, pair.place};
+      if (own_crossings_.are_near(place)) continue;
+      crossings_.push_back(place);
+      for (const std::uint32_t t : {pair.first, pair.second}) {
+        suspects_.push_back(key_of(near.surface(), t));
+      }
     }
   }
 
@@ -169,18 +178,18 @@ class Checker {
     lost_.clear();
     for (const Miss& miss : find_misses(original_, which, grids, options_.max_error_mm, quiet_)) {
       lost_.push_back(miss.triangle);
-      add_beyond(miss);
+      add_beyond(miss, box_of(original_.view, original_.view.triangles[miss.triangle]));
     }
   }
 
-  // Leaves less of the error around what is beyond it, and no vertex goes where others cross.
-  void tighten() {
-    const MarkedCubes beyond(beyond_, edge_mm_ / 2);
-    const MarkedCubes crossings(crossings_, edge_mm_ / 2);
+  // Leaves this much of the error around what is beyond it, and no vertex goes where others cross.
+  void tighten(float share) {
+    const MarkedCubes beyond(beyond_, edge_mm_ / 4);
+    const MarkedCubes crossings(crossings_, std::max(edge_mm_, options_.max_error_mm) / 2);
     for_each(quiet_, shares_.size(), [&](std::size_t v) {
       const Point place = to_point(mesh_.positions[v]);
       const Box box = {place, place};
-      if (beyond.are_near(box)) shares_[v] *= kTighter;
+      if (beyond.are_near(box)) shares_[v] *= share;
       if (crossings.are_near(box)) shares_[v] = 0;
     });
   }
@@ -216,7 +225,7 @@ class Checker {
   const MarkedCubes own_crossings_;  // of the mesh with itself
   std::vector<float> shares_;        // of the error, near each vertex
   std::vector<Key> known_;           // of the triangles of the last proposal, in order
-  std::vector<Key> suspects_;        // those beyond the error, in order
+  std::vector<Key> suspects_;        // those beyond the error or across others, in order
   std::vector<Box> changed_;
   std::vector<std::uint32_t> lost_;  // original triangles beyond the error; in order
   std::vector<Box> beyond_;          // places beyond the error

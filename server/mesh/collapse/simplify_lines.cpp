@@ -159,7 +159,8 @@ class LineSimplifier {
 
   bool collapse(std::uint32_t v, std::uint32_t into, std::uint32_t beyond) {
     const auto [gone, kept] = split_star(v, into);
-    if (has(on_line_beside_[into], beyond) || !links_meet_at_edge(v, into, gone)) return false;
+    const bool is_edge = has(on_line_beside_[into], beyond) || may_be_edge_elsewhere(into, beyond);
+    if (is_edge || !links_meet_at_edge(v, into, gone)) return false;
     if (!stays_upright(v, into, kept)) return false;
     if (around_.points != nullptr && !stays_near(v, into, gone, kept)) return false;
     move(v, into, beyond, gone, kept);
@@ -197,6 +198,11 @@ class LineSimplifier {
                                [&](std::uint32_t t) { return has(patch_.triangles[t], b); });
   }
 
+  // Other patches may have the edge, or make it at the same time.
+  bool may_be_edge_elsewhere(std::uint32_t a, std::uint32_t b) const {
+    return (patch_.stays[a] & patch_.stays[b] & kIsElsewhere) != 0;
+  }
+
   Numbers neighbours(std::uint32_t v) const {
     Numbers found;
     for (const std::uint32_t t : around_vertex_[v]) {
@@ -216,7 +222,7 @@ class LineSimplifier {
     if (std::ranges::adjacent_find(apexes) != apexes.end()) return false;
     const auto is_beside_both = [&](std::uint32_t vertex) {
       return vertex != into && !std::ranges::binary_search(apexes, vertex) &&
-             are_neighbours(vertex, into);
+             (are_neighbours(vertex, into) || may_be_edge_elsewhere(vertex, into));
     };
     if (std::ranges::any_of(neighbours(v), is_beside_both)) return false;
     return std::ranges::none_of(around_vertex_[v], [&](std::uint32_t t) {

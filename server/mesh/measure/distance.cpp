@@ -52,10 +52,14 @@ class Points {
   std::size_t step_ = 1;  // every so many runs one is measured
 };
 
-float distance_of(const Point& point, const TriangleGrid& to, std::uint32_t& guess) {
+void throw_if_not_finite(const Point& point) {
   if (!std::isfinite(point[0]) || !std::isfinite(point[1]) || !std::isfinite(point[2])) {
     throw Error(ErrorCode::kUnusableVolume, "a position of the mesh is not a finite number");
   }
+}
+
+float distance_of(const Point& point, const TriangleGrid& to, std::uint32_t& guess) {
+  throw_if_not_finite(point);
   const TriangleGrid::Nearest nearest = to.nearest(point, guess);
   guess = nearest.triangle;
   return static_cast<float>(std::sqrt(nearest.squared_mm));
@@ -103,7 +107,11 @@ DistanceSummary measure_within(const SurfaceView& from, const SurfaceView& to, d
   if (std::isfinite(reach_mm) && points.size() < all / kFew) {
     std::vector<Box> places;
     places.reserve(points.size());
-    for (std::size_t n = 0; n < points.size(); ++n) places.push_back({points[n], points[n]});
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const Point point = points[n];
+      throw_if_not_finite(point);
+      places.push_back({point, point});
+    }
     const MarkedCubes cubes(places, reach_mm);
     std::vector<Triangle> near;
     for (const Triangle& triangle : to.triangles) {
