@@ -153,7 +153,7 @@ void Patches::take(const std::vector<Result>& results, const Context& context) {
   parallel_for(context, results.size(), [&](std::size_t k) {
     const auto at = static_cast<std::ptrdiff_t>(begin[k]);
     std::ranges::copy(results[k].triangles, triangles_.begin() + at);
-    std::ranges::copy(results[k].numbers, numbers_.begin() + at);
+    if (!numbers_.empty()) std::ranges::copy(results[k].numbers, numbers_.begin() + at);
   });
   for (const Result& result : results) {
     for (const std::uint32_t v : result.seams) is_seam_[v] = 1;

@@ -125,7 +125,7 @@ TEST(Misses, AgreeWithManyDistancesOfOtherCode) {
 // another one.
 TEST(Misses, AreNoneOfSimplifiedWalls) {
   constexpr double kError = 0.2;
-  const auto volume = label_cells(5, {24, 22, 23}, 9, 31);
+  const auto volume = label_cells(5, {16, 15, 14}, 9, 31);
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 4))) {
     const SeparatingSurface original = separated(volume, options);
     SeparatingSurface surface = separated(volume, options);
