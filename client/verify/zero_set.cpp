@@ -8,7 +8,7 @@
 namespace isomesh::verify {
 namespace {
 
-constexpr std::uint32_t kNone = UINT32_MAX;
+constexpr std::uint32_t kNoVertex = UINT32_MAX;
 
 // Corners of a cell are 0..7; their bits are the offsets along x, y and z.
 using Tetrahedron = std::array<unsigned, 4>;
@@ -52,7 +52,7 @@ class March {
   std::vector<std::array<std::uint32_t, 8>>& points(std::int64_t k) { return points_[k & 1]; }
   void forget(std::int64_t k) {
     points(k).assign(static_cast<std::size_t>(field_.dims[0] * field_.dims[1]),
-                     {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone});
+                     {kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex});
   }
 
   std::size_t in_plane(unsigned c) const {
@@ -75,7 +75,7 @@ class March {
   std::uint32_t crossing(unsigned inside, unsigned outside) {
     const unsigned owner = inside & outside;
     std::uint32_t& number = points(cell_[2] + (owner >> 2))[in_plane(owner)][inside ^ outside];
-    if (number == kNone) {
+    if (number == kNoVertex) {
       number = static_cast<std::uint32_t>(surface_.points.size());
       const double share = value(inside) / (value(inside) - value(outside));
       surface_.points.push_back(place(inside) + share * (place(outside) - place(inside)));
