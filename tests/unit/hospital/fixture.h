@@ -106,8 +106,8 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::function<void()> after_store = [] {};  // set it before there are orders
   std::function<void()> on_fetched;           // called when the images have come
 
-  std::vector<FoundSeries> find_recent(const std::string&, const std::string&,
-                                       const std::stop_token&) override {
+  RecentSeries find_recent(const std::string&, const std::string&,
+                           const std::stop_token&) override {
     return {};
   }
   std::optional<FoundSeries> find_series(const std::string&, const std::string& series,
