@@ -27,7 +27,9 @@ void check_status(const PeerResponseHead& head) {
   if (status >= 200 && status < 300) return;
   const std::string said = "the PACS responded with status " + std::to_string(status);
   if (status == 401 || status == 403) throw PacsFailure(PacsFault::kUnauthorized, said);
-  if (status == 408 || status == 425 || status == 429 || status >= 500) {
+  constexpr int kNotImplemented = 501;
+  const bool is_busy = status == 408 || status == 425 || status == 429 || status >= 500;
+  if (is_busy && status != kNotImplemented) {
     throw PacsFailure(PacsFault::kBusy, said, head.retry_after);
   }
   throw PacsFailure(PacsFault::kRefused, said);
@@ -85,13 +87,24 @@ bool names(const std::vector<PeersObject>& objects, const std::string& instance)
   return std::ranges::find(objects, instance, &PeersObject::instance) != objects.end();
 }
 
+// True if the PACS did not store the object because it has one with this UID. The UID depends on
+// the contents, so that is the same object.
+bool is_duplicate(std::optional<std::uint16_t> reason) {
+  constexpr std::uint16_t kDuplicate = 0x0111;   // PS3.7, C.5.9
+  constexpr std::uint16_t kAzureStored = 45070;  // these two: the DICOM service of Microsoft
+  constexpr std::uint16_t kAzureIsBeingStored = 45071;
+  return reason == kDuplicate || reason == kAzureStored || reason == kAzureIsBeingStored;
+}
+
 // Throws the reason given by the PACS for not storing the object (PS3.18, table I.2-2).
 [[noreturn]] void throw_not_stored(std::optional<std::uint16_t> reason) {
   constexpr std::uint16_t kOutOfResources = 0xA700;
+  constexpr std::uint16_t kProcessingFailure = 0x0110;
   const std::string said =
       reason ? "the PACS did not store the mesh and gave the reason " + std::to_string(*reason)
              : "the PACS did not store the mesh and gave no reason";
-  const bool may_pass = !reason || (*reason & 0xFF00) == kOutOfResources;
+  const bool may_pass =
+      !reason || (*reason & 0xFF00) == kOutOfResources || *reason == kProcessingFailure;
   throw PacsFailure(may_pass ? PacsFault::kBusy : PacsFault::kRefused, said);
 }
 
@@ -154,13 +167,11 @@ std::optional<PeersObject> DicomWeb::search_one(const std::string& target,
   return *same;
 }
 
-orders::RecentSeries DicomWeb::find_recent(const std::string& from_day,
-                                           const std::string& modality,
+orders::RecentSeries DicomWeb::find_recent(const std::string& from_day, const std::string& modality,
                                            const std::stop_token& stop) {
   const std::string days = "?StudyDate=" + percent_encode(from_day) + '-';
   const std::string value = percent_encode(modality);
-  const std::string series_fields =
-      kSeriesFields + (modality.empty() ? "" : "&Modality=" + value);
+  const std::string series_fields = kSeriesFields + (modality.empty() ? "" : "&Modality=" + value);
   if (auto found = find_series_of_all_studies(days + '&' + series_fields, stop)) {
     return *std::move(found);
   }
@@ -206,9 +217,9 @@ std::optional<orders::RecentSeries> DicomWeb::find_series_of_all_studies(
 std::optional<FoundSeries> DicomWeb::find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token& stop) {
-  const auto found = search_one(
-      "/studies/" + study + "/series?SeriesInstanceUID=" + series + '&' + kSeriesFields,
-      &PeersObject::series, series, stop);
+  const auto found =
+      search_one("/studies/" + study + "/series?SeriesInstanceUID=" + series + '&' + kSeriesFields,
+                 &PeersObject::series, series, stop);
   if (!found) return std::nullopt;
   return series_of(*found);
 }
@@ -216,10 +227,10 @@ std::optional<FoundSeries> DicomWeb::find_series(const std::string& study,
 std::vector<std::string> DicomWeb::list_instances(const std::string& study,
                                                   const std::string& series,
                                                   const std::stop_token& stop) {
-  SearchResults results = search({.target = "/studies/" + study + "/series/" + series +
-                                            "/instances?includefield=00080018",
-                                  .uid = &PeersObject::instance},
-                                 stop);
+  SearchResults results = search(
+      {.target = "/studies/" + study + "/series/" + series + "/instances?includefield=00080018",
+       .uid = &PeersObject::instance},
+      stop);
   if (results.is_cut) {
     throw PacsFailure(PacsFault::kRefused,
                       "the PACS lists only " + std::to_string(results.objects.size()) +
@@ -235,13 +246,23 @@ std::vector<std::string> DicomWeb::list_instances(const std::string& study,
 std::string DicomWeb::fetch_series(const std::string& study, const std::string& series,
                                    const std::filesystem::path& target,
                                    const std::stop_token& stop) {
-  const PeerResponseHead head =
-      peer_.send({.target = "/studies/" + study + "/series/" + series,
-                  .accept = "multipart/related; type=\"application/dicom\"; transfer-syntax=" +
-                            settings_.transfer_syntax,
-                  .response_file = target,
-                  .most_bytes = most_series_bytes_},
-                 stop);
+  const std::string accepted = "multipart/related; type=\"application/dicom\"";
+  const auto get = [&](const std::string& accept) {
+    return peer_.send({.target = "/studies/" + study + "/series/" + series,
+                       .accept = accept,
+                       .response_file = target,
+                       .most_bytes = most_series_bytes_},
+                      stop);
+  };
+  constexpr int kNotAcceptable = 406;
+  PeerResponseHead head = get(accepted + "; transfer-syntax=" + settings_.transfer_syntax);
+  // Some PACS do not know "*". Without it, they convert to Explicit VR Little Endian.
+  if (head.status == kNotAcceptable && settings_.transfer_syntax == "*") head = get(accepted);
+  if (head.status == kNotAcceptable) {
+    throw PacsFailure(PacsFault::kRefused,
+                      "the PACS does not send the series in the transfer syntax that was requested "
+                      "(status 406): set transfer-syntax of this PACS to one that it supports");
+  }
   constexpr int kPartialContent = 206;
   constexpr int kNotFound = 404;
   if (head.status == kPartialContent || head.status == kNotFound) {
@@ -289,7 +310,10 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
   const std::string& instance = object.place.instance;
   if (names(said.stored, instance)) return;
   const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);
-  if (failed != said.failed.end()) throw_not_stored(failed->failure);
+  if (failed != said.failed.end()) {
+    if (is_duplicate(failed->failure)) return;
+    throw_not_stored(failed->failure);
+  }
   if (head.status == kConflict) {
     throw PacsFailure(PacsFault::kRefused, "the PACS responded with status 409");
   }

@@ -143,7 +143,8 @@ class Exchange {
     switch (result) {
       case CURLE_BAD_CONTENT_ENCODING:
         if (is_decoded(encoding_)) {
-          throw PacsFailure(PacsFault::kUnreadable, "the compressed response of the PACS is damaged");
+          throw PacsFailure(PacsFault::kUnreadable,
+                            "the compressed response of the PACS is damaged");
         }
         throw PacsFailure(PacsFault::kRefused,
                           "the PACS compresses its responses in a way that cannot be read "

@@ -117,7 +117,8 @@ class ObjectReceiver {
  public:
   virtual ~ObjectReceiver() = default;
 
-  // Returns once the PACS has confirmed that it stored this object.
+  // Returns once the PACS has confirmed that it stored this object, or that it has one with this
+  // UID, which an earlier attempt stored.
   virtual void store(const OutgoingObject& object, const std::stop_token& stop) = 0;
 };
 
