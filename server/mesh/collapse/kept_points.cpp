@@ -34,7 +34,8 @@ KeptPoints::KeptPoints(const WalledSurface& original, const WallGrids& grids, do
 
 bool KeptPoints::replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes,
                          const Collapse& collapse) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> moves;
+  thread_local std::vector<std::pair<std::uint32_t, std::uint32_t>> moves;  // keeps its memory
+  moves.clear();
   for (const std::uint32_t t : star) {
     for (std::uint32_t point = first_[t]; point != kNone; point = next_[point]) {
       const std::uint32_t home = home_of(point, t, shapes);
@@ -51,7 +52,7 @@ bool KeptPoints::replace(std::span<const std::uint32_t> star, std::span<const Sh
   return true;
 }
 
-// At its centre, and at the middles of its edges, which are often farther.
+// At its centre, and at the middles of its new edges, which are often farther.
 bool KeptPoints::is_near(const Shape& shape) const {
   const auto& [a, b, c] = shape.corners;
   const TriangleGrid& grid = grids_.grid_of(shape.triangle);
@@ -61,7 +62,7 @@ bool KeptPoints::is_near(const Shape& shape) const {
     return grid.within(place, squared_mm_, guess).triangle != kNone;
   };
   return is_near(plus(plus(a, b), c), 1.0 / 3) && is_near(plus(a, b), 0.5) &&
-         is_near(plus(b, c), 0.5) && is_near(plus(c, a), 0.5);
+         (!shape.is_third_new || is_near(plus(c, a), 0.5));
 }
 
 std::uint32_t KeptPoints::home_of(std::uint32_t point, std::uint32_t triangle,

@@ -21,9 +21,12 @@ class KeptPoints {
   KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm,
              History& history);
 
+  // A triangle with a new first corner. The edge to its second one may be new, and with
+  // `is_third_new` that to its third; the others were near before.
   struct Shape {
     std::uint32_t triangle = 0;
     mesh::Corners corners;
+    bool is_third_new = false;
   };
 
   // True if the collapse may replace the triangles of the `star` by these shapes, some of them. If

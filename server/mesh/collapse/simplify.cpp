@@ -163,7 +163,7 @@ class Simplifier {
   void reduce(const CubeCut& cut, const Context& context, double share) {
     const std::vector<std::uint32_t> degrees = count_triangles();
     begin_pass();
-    effect_.blocks += patches_.collapse(cut, context, [&](Patch& patch) {
+    patches_.collapse(cut, context, [&](Patch& patch) {
       set_stays(degrees, patch);
       hold_lines(patch);
       const double least = share * static_cast<double>(patch.triangles.size());

@@ -32,7 +32,6 @@ struct SimplifyOptions {
 struct SimplificationEffect {
   std::uint64_t triangles_before = 0;
   std::uint64_t triangles_after = 0;
-  std::uint64_t blocks = 0;  // of triangles that were simplified together, in all rounds
   // True if the target count was reached, or if there was none.
   bool reached_triangles = true;
   // True if the target was not reached because no further edge can collapse, whatever the error.

@@ -173,7 +173,9 @@ class LineSimplifier {
     for (const std::uint32_t t : gone) star.push_back(patch_.numbers[t]);
     for (const std::uint32_t t : kept) {
       star.push_back(patch_.numbers[t]);
-      shapes.push_back({star.back(), corners_of(moved(t, v, into))});
+      Triangle corners = moved(t, v, into);
+      std::rotate(corners.begin(), std::ranges::find(corners, into), corners.end());
+      shapes.push_back({star.back(), corners_of(corners), true});
     }
     const Collapse step = {patch_.names[v], patch_.names[into], around_.step + collapses_};
     return around_.points->replace(star, shapes, step);
