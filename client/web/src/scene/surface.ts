@@ -26,7 +26,6 @@ import { onTap } from './tap';
 import { firstOffset, fitted, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
 const settleDelay = 180;
-const markZoom = 4;
 
 export class Surface {
   readonly canvas: HTMLCanvasElement;
@@ -237,13 +236,13 @@ export class Surface {
     this.draw();
   }
 
-  // Marks those places, and goes nearer to the first of them.
+  // Marks those places, and looks from outside at the first of them.
   mark(places: readonly Vec3[]): void {
     this.marks.show(places);
-    const [target] = places;
-    if (!target) return;
-    const { offset } = fitted(this.bounds, this.place.offset, (verticalAngle * Math.PI) / 180, this.camera.aspect);
-    this.moveTo({ target, offset: offset.map((value) => value / markZoom) as Vec3 });
+    const [first] = places;
+    if (!first) return;
+    const outwards = first.map((value, axis) => value - (this.bounds[0][axis as 0] + this.bounds[1][axis as 0]) / 2) as Vec3;
+    this.fit(Math.hypot(...outwards) > 0 ? outwards : this.place.offset);
   }
 
   setHidden(labels: ReadonlySet<Label>): void {

@@ -6,13 +6,13 @@ import { isFinal, type Job, type JobParameters, type Volume } from '../../api/ty
 import { emptyReason } from '../../job/empty';
 import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords, surfaceInWords } from '../../job/parameters';
-import { changeLink } from '../../job/variants';
+import { changeLink, eraseJob } from '../../job/variants';
 import { surfaceDrawing } from '../../scene/graphics';
 import { placeOfText } from '../../scene/views';
 import { button, h } from '../../ui/dom';
 import { formatIso, shortId } from '../../ui/format';
 import { refusal, tellError } from '../../ui/notices';
-import { noteInAddress, type Route } from '../../ui/route';
+import { go, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { volumeName } from '../../volume/names';
 import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
@@ -52,6 +52,7 @@ function head(job: Job, volume: Volume | null): HTMLElement {
     h('p', inWords(job.parameters)),
     h('p.links', [
       volume && h('a', { href: changeLink(job) }, 'Change parameters'),
+      isFinal(job.state) && button('Erase', () => void eraseJob(job).then((isErased) => isErased && go(['jobs'])), { class: 'link' }),
       h('span.faint', `job ${shortId(job.id)}`),
     ]),
   ]);

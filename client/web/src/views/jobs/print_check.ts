@@ -57,7 +57,7 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
   }
   const [low, high] = mesh.bounds;
   const size = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');
-  const material = mesh.quality.encloses_volume ? `, ${formatNumber(mesh.volume_mm3.smoothed / 1000, 4)} cm\u00b3 if it is filled` : '';
+  const material = mesh.quality.encloses_volume ? `, ${formatNumber(mesh.volume_mm3.smoothed / 1000, 2)} cm\u00b3 if it is filled` : '';
   points.push(point('told', `${size} mm${material}.`));
   const files = ['stl', '3mf'].flatMap((format) => {
     const file = mesh.files[format as 'stl'];

@@ -3,7 +3,7 @@ import introPicture from '../../intro.webp';
 import { client } from '../../client';
 import type { Job, Volume } from '../../api/types';
 import { inWords, surfaceInWords } from '../../job/parameters';
-import { button, h } from '../../ui/dom';
+import { button, checkbox, h } from '../../ui/dom';
 import { formatBytes, formatCount, formatSpacing, formatTime } from '../../ui/format';
 import { ask, askText, tell, tellError } from '../../ui/notices';
 import { hashOf } from '../../ui/route';
@@ -69,15 +69,17 @@ function thumbnail(volume: Volume, scope: Scope): HTMLElement {
 
 function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChanged: () => void): HTMLElement {
   const erase = async (): Promise<void> => {
+    let isWithJobs = false;
     const sure = await ask(
       'Erase this volume?',
-      `${volumeName(volume)} and its samples will be removed from the server. The surfaces made from it stay.`,
+      `${volumeName(volume)} and its samples will be removed from the server.`,
       'Erase',
+      checkbox('Also erase the surfaces that were made from it', false, (isOn) => (isWithJobs = isOn)),
     );
     if (!sure) return;
     try {
-      await client.eraseVolume(volume.id);
-      tell('The volume was erased.');
+      await client.eraseVolume(volume.id, isWithJobs ? { jobs: 'erase' } : {});
+      tell(isWithJobs ? 'The volume and its surfaces were erased.' : 'The volume was erased.');
       onErased();
     } catch (error) {
       tellError(error);
