@@ -105,7 +105,7 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.probe(post, "/v1/volumes?upload=" + std::string(32, '0'));
   statuses.probe("GET /v1/volumes", "/v1/volumes");
   statuses.probe("GET /v1/volumes", "/v1/volumes?cursor=x");
-  for (const std::string part : {"", "/histogram", "/labels", "/slice.png", "/preview"}) {
+  for (const std::string part : {"", "/histogram", "/labels", "/slice.png", "/slice", "/preview"}) {
     const std::string get = "GET /v1/volumes/{id}" + part;
     statuses.probe(get, "/v1/volumes/" + id + part);
     statuses.probe_one(get, "/v1/volumes/" + id + part, id);
