@@ -91,7 +91,7 @@ void simplify_checked(const MeshParameters& parameters, const ExtractedSurface& 
   if (effect.is_within) {
     certificate.bound_mm = parameters.max_error_mm;
   } else {
-    certificate.why_unproven = "Some points are farther than the limit after all attempts.";
+    certificate.why_unproven = "Some points are farther than the limit, which could not be repaired.";
   }
 }
 

@@ -27,9 +27,6 @@ struct SimplifyOptions {
   std::span<const Vec3> before = {};
   // Target triangle count. 0: as few as the error allows.
   std::uint64_t triangles = 0;
-  // The share of the error that simplification may use near each vertex of the mesh. With 0 the
-  // vertex stays, on junction curves too. Empty: as large for all as serves best.
-  std::span<const float> shares = {};
 };
 
 struct SimplificationEffect {

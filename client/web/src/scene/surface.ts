@@ -15,6 +15,7 @@ import { CoarseMaker } from './coarse_maker';
 import type { Reach } from './distances';
 import { Frame, type Manner } from './frame';
 import { joinSeams } from './joining';
+import { Marks } from './marks';
 import { Parts } from './parts';
 import { pickedAt, type Picked } from './picked';
 import { pictureOf } from './picture';
@@ -25,12 +26,14 @@ import { onTap } from './tap';
 import { firstOffset, fitted, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
 const settleDelay = 180;
+const markZoom = 4;
 
 export class Surface {
   readonly canvas: HTMLCanvasElement;
   readonly rulers: Rulers;
   readonly cut: Cut;
   private readonly cross: Cross;
+  private readonly marks: Marks;
   private readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
   // More blocks can be drawn.
@@ -93,6 +96,7 @@ export class Surface {
     this.rulers = new Rulers(this.scene, host, '#17a398');
     this.cut = new Cut(this.scene);
     this.cross = new Cross(this.scene);
+    this.marks = new Marks(this.scene);
 
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.zoomToCursor = true;
@@ -233,6 +237,15 @@ export class Surface {
     this.draw();
   }
 
+  // Marks those places, and goes nearer to the first of them.
+  mark(places: readonly Vec3[]): void {
+    this.marks.show(places);
+    const [target] = places;
+    if (!target) return;
+    const { offset } = fitted(this.bounds, this.place.offset, (verticalAngle * Math.PI) / 180, this.camera.aspect);
+    this.moveTo({ target, offset: offset.map((value) => value / markZoom) as Vec3 });
+  }
+
   setHidden(labels: ReadonlySet<Label>): void {
     this.parts.setHidden(labels);
     this.draw();
@@ -326,8 +339,8 @@ export class Surface {
     cancelAnimationFrame(this.scheduled);
     clearTimeout(this.settling);
     this.resizing.disconnect();
-    const { controls, parts, copies, uploading, rulers, cut, cross, cube, renderer } = this;
-    for (const one of [controls, parts, copies, uploading, this.frame.painting, rulers, cut, cross, cube, renderer]) one?.dispose();
+    const { controls, parts, copies, uploading, rulers, cut, cross, marks, cube, renderer } = this;
+    for (const one of [controls, parts, copies, uploading, this.frame.painting, rulers, cut, cross, marks, cube, renderer]) one?.dispose();
     // The browser keeps only some contexts; it must not wait for garbage to be collected.
     this.renderer.forceContextLoss();
     this.canvas.remove();

@@ -17,6 +17,7 @@ import type { Scope } from '../../ui/signal';
 import { volumeName } from '../../volume/names';
 import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
 import { SlicesBeside } from './job_slices';
+import { printCheck } from './print_check';
 import { LabelList } from '../labels/label_list';
 import { SurfacePane } from '../surface/surface_pane';
 import { cameraNote } from '../surface/view_tools';
@@ -176,9 +177,11 @@ function showSurface(
   pane.onCamera = cameraNote(scope);
   stageArea.replaceChildren(pane.element);
   const times = timings(job);
+  const check = printCheck(job, (places) => pane.mark(places));
   panel.replaceChildren(
     head(job, volume),
     ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
+    check ? section('Before you print', check) : '',
     section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),
     accuracy(job) ?? '',
     times,

@@ -39,21 +39,31 @@ async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal:
   canvas.dataset.painted = '';
 }
 
+// Only what comes into sight is fetched.
+function whenSeen(element: HTMLElement, scope: Scope, run: () => void): void {
+  const seen = new IntersectionObserver((entries) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    seen.disconnect();
+    run();
+  });
+  seen.observe(element);
+  scope.onEnd(() => seen.disconnect());
+}
+
+// Lists leave the patient out.
+async function namePatient(volume: Volume, title: HTMLElement): Promise<void> {
+  const { dicom } = await client.getVolume(volume.id);
+  title.textContent = title.title = volumeName({ ...volume, dicom });
+}
+
 function thumbnail(volume: Volume, scope: Scope): HTMLElement {
   const canvas = h('canvas.thumbnail', {
     width: thumbnailPixels,
     height: thumbnailPixels,
     'aria-hidden': 'true',
   });
-  // Only what comes into sight is fetched.
-  const seen = new IntersectionObserver((entries) => {
-    if (!entries.some((entry) => entry.isIntersecting)) return;
-    seen.disconnect();
-    // A card without its picture still says everything.
-    paintThumbnail(canvas, volume, scope.signal).catch(() => canvas.classList.add('blank'));
-  });
-  seen.observe(canvas);
-  scope.onEnd(() => seen.disconnect());
+  // A card without its picture still says everything.
+  whenSeen(canvas, scope, () => void paintThumbnail(canvas, volume, scope.signal).catch(() => canvas.classList.add('blank')));
   return canvas;
 }
 
@@ -85,11 +95,14 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
   };
   const name = volumeName(volume);
   const kind = volumeKind(volume);
+  const title = h('strong', { title: name }, name);
+  // A card without its patient is still a card.
+  if (volume.format === 'dicom') whenSeen(title, scope, () => void namePatient(volume, title).catch(() => undefined));
   return h('li.card', { 'data-volume': volume.id }, [
     h('a.card-link', { href: hashOf(['volumes', volume.id]) }, [
       thumbnail(volume, scope),
       h('span.card-text', [
-        h('strong', { title: name }, name),
+        title,
         h('span', name === kind ? volume.type : kind),
         h('span', formatSpacing(volume.spacing)),
         h('span.faint', `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
