@@ -64,9 +64,12 @@ constexpr std::array kExamples = {
 )"},
     Examples{"erase", R"(
   isomesh erase 3f2a91c0 77b01d2e
+  isomesh erase --with-jobs 3f2a91c0
+  isomesh erase --jobs 0192e4b1-77c3
 )"},
     Examples{"list", R"(
   isomesh list --state running
+  isomesh list --volume 3f2a91c0 --since 2026-11-20
   isomesh list --volumes
 )"},
     Examples{"info", R"(

@@ -1,4 +1,5 @@
 // Jobs over HTTP: submitting, waiting, cancelling, listing.
+#include <algorithm>
 #include <set>
 #include <string>
 #include <thread>
@@ -123,7 +124,7 @@ TEST_F(JobsTest, ARunningJobStopsWhenItIsCancelled) {
 
 TEST_F(JobsTest, AFinishedJobCannotBeCancelled) {
   const Job job = finished_job(daemon_);
-  const Answer answer = daemon_.send("DELETE", "/v1/jobs/" + job.id);
+  const Answer answer = daemon_.send("DELETE", "/v1/jobs/" + job.id + "?erase=false");
   EXPECT_EQ(answer.status, 200);
   EXPECT_EQ(job_from_json(answer.body), job);
 }
@@ -314,7 +315,8 @@ TEST_F(JobsTest, ALongListComesInPieces) {
   EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?state=failed"), 0, 0), "");
   EXPECT_NE(expect_page(daemon_.get("/v1/jobs"), 0, 100), "") << "a page of the usual length";
   Client client = daemon_.client();
-  EXPECT_EQ(client.jobs(JobState::kSucceeded, client.jobs().next).jobs.front().id, ids[100]);
+  EXPECT_EQ(client.jobs({.state = JobState::kSucceeded}, client.jobs().next).jobs.front().id,
+            ids[100]);
   const Answer old = answer_to(daemon_.url(), "GET /v1/jobs?limit=1000 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(expect_page(old, 0, 250), "");
   const Answer plain = daemon_.get("/v1/jobs?limit=1000", {{"Accept-Encoding", "gzip, br"}});
