@@ -59,6 +59,9 @@ constexpr std::array kExamples = {
     Examples{"cancel", R"(
   isomesh cancel 0192e4b1-77c3
 )"},
+    Examples{"report", R"(
+  isomesh report 0192e4b1-77c3 -o report.json
+)"},
     Examples{"rename", R"(
   isomesh rename 3f2a91c0 "CT of the knee"
 )"},

@@ -144,6 +144,12 @@ class Parser {
                              [&](std::int64_t label) { options_.label = label; });
     add_allow_empty(fetch, options_, kWriteEmpty);
 
+    CLI::App& report = command(Command::kReport, "report",
+                               "Print what a finished job made, of what and how, as JSON to keep");
+    add_id(report, options_, "JOB");
+    report.add_option("-o,--output", options_.report, "File to write instead of standard output")
+        ->type_name("FILE");
+
     add_id(command(Command::kCancel, "cancel", "Cancel a job"), options_, "JOB");
 
     CLI::App& rename = command(Command::kRename, "rename", "Rename a volume");

@@ -27,6 +27,7 @@ enum class Command {
   kList,
   kInfo,
   kLabels,
+  kReport,
   kIds,
   kAdded,
 };
@@ -63,6 +64,7 @@ struct Options {
   std::filesystem::path daemon;              // its program; empty: searched for
   std::string key;                           // submit
   std::vector<Output> outputs;               // mesh, fetch
+  std::filesystem::path report;              // report: the file to write; empty: standard output
   JobFilter filter;                          // list
   std::string cursor;                        // list
   bool volumes = false;                      // list

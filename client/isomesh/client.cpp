@@ -11,6 +11,7 @@
 #include "client/isomesh/file.h"
 #include "client/isomesh/impl.h"
 #include "proto/json.h"
+#include "proto/json_tree.h"
 
 namespace isomesh {
 namespace {
@@ -355,6 +356,12 @@ Job Client::follow(const std::string& id, const JobListener& listener) {
 
 std::vector<LabelSummary> Client::job_labels(const std::string& id) {
   return impl_->all_pages(job_path(id) + "/labels", labels_from_json);
+}
+
+std::string Client::report(const std::string& id) {
+  std::string body = impl_->repeat({.target = job_path(id) + "/report"});
+  if (!json_values::is_object(JsonTree(body).root())) throw other_api();
+  return body;
 }
 
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,

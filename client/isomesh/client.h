@@ -196,6 +196,10 @@ class Client {
   // kNotReady, the job's own error or kCancelled as fetch() does.
   std::vector<LabelSummary> job_labels(const std::string& id);
 
+  // What a finished job made, of what and how, as JSON. Throws kNotReady, the job's own error or
+  // kCancelled as fetch() does.
+  std::string report(const std::string& id);
+
   // Writes the mesh of a finished job to `target`, which appears only when complete and with the
   // SHA-256 that the job states. Resumes after a broken connection. Throws kNotReady if the job has
   // not ended, the job's own error if it failed, kCancelled if it was cancelled, kNotFound if it

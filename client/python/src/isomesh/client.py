@@ -308,6 +308,10 @@ class Client:
         pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
         return cast("Iterator[api.LabelSummary]", pages)
 
+    def report(self, job: Union[str, AnyJob]) -> api.JobReport:
+        """What a succeeded job made, of what and how: to keep beside its mesh."""
+        return cast("api.JobReport", self._exchange.get(f"{_job_path(job)}/report", answers.REPORT))
+
     def cancel(self, job: Union[str, AnyJob]) -> api.Job:
         """Cancels a job. A job that has ended stays as it is."""
         return cast("api.Job", self._exchange.cancel(_job_path(job)))
