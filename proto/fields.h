@@ -131,7 +131,9 @@ void visit(Is<Callback> auto& self, auto&& field) {
 
 void visit(Is<Timing> auto& self, auto&& field) {
   for (const StageRow& row : kStages) {
-    if (row.elapsed != nullptr) field(row.name, self.*row.elapsed);
+    if (row.elapsed == nullptr) continue;
+    // Records of before a stage was added lack it.
+    field(Parameter{.name = row.name, .may_be_absent = !row.is_always_run}, self.*row.elapsed);
   }
   field("total", self.total);
 }
@@ -216,6 +218,12 @@ void visit(Is<MeshCertificate> auto& self, auto&& field) {
   }
 }
 
+void visit(Is<Untangling> auto& self, auto&& field) {
+  field("pairs", self.pairs);
+  field("vertices", self.vertices);
+  field("left", self.left);
+}
+
 void visit(Is<Simplification> auto& self, auto&& field) {
   field("triangles_before", self.triangles_before);
   field("bound_by", self.bound_by);
@@ -266,6 +274,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("components", self.components);
   field("euler", self.euler);
   field("dropped", self.dropped);
+  if (is_told(self, self.untangled.has_value())) {
+    field("untangled", self.untangled);
+  }
   if (is_told(self, self.simplified.has_value())) {
     field("simplified", self.simplified);
   }

@@ -1,3 +1,12 @@
+// What removing self-intersections found after smoothing, and moved.
+struct Untangling {
+  std::uint64_t pairs = 0;     // of triangles that intersected
+  std::uint64_t vertices = 0;  // moved back towards their extracted positions
+  std::uint64_t left = 0;      // pairs that intersect as extracted
+
+  bool operator==(const Untangling&) const = default;
+};
+
 // A finished job's report on its mesh. Plain values.
 #pragma once
 
@@ -273,6 +282,7 @@ struct MeshSummary {
   std::uint64_t components = 0;
   std::int64_t euler = 0;
   Dropped dropped;
+  std::optional<Untangling> untangled = {};       // if requested
   std::optional<Simplification> simplified = {};  // if fewer triangles were requested
   MeshQuality quality;
   double area_mm2 = 0;

@@ -273,6 +273,19 @@ constinit const Parameter kMaxDisplacementMm = {
     .unit = "mm",
     .minimum = 0};
 
+constinit const Parameter kUntangle = {
+    .name = "untangle",
+    .title = "Remove self-intersections",
+    .help =
+        "Remove the self-intersections that smoothing makes: move vertices back towards "
+        "their extracted positions.",
+    .more =
+        "The vertices of triangles that intersect move back by half, again and again, until no "
+        "triangles intersect; at worst to where they were extracted. It needs smoothing, so "
+        "`passes` must not be 0. `mesh.untangled` says what was found and moved. `certify` counts "
+        "again, also in files that round coordinates.",
+    .may_be_absent = true};
+
 constinit const Parameter kClose = {
     .name = "close",
     .title = "Close the surface at the volume's border",

@@ -83,6 +83,7 @@ struct MeshParameters {
   std::optional<double> lambda;               // empty: default_lambda()
   double pass_band = 0.1;                     // of Taubin smoothing
   std::optional<double> max_displacement_mm;  // empty: no limit
+  bool untangle = false;  // moves vertices back where smoothing made triangles intersect
   bool close = false;
   ComponentFilter components;
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
@@ -154,8 +155,8 @@ extern const Parameter kKeep, kMinTriangles, kNearestTo;
 extern const Parameter kPositionBits, kSpeed;
 extern const Parameter kIso, kLabels, kBackground, kLabelNames, kLabelColors, kLabelValues, kScheme,
     kInterpolation, kRegularize, kPasses, kSmoothing, kLambda, kPassBand, kMaxDisplacementMm,
-    kClose, kComponents, kFillCavities, kCrop, kMaxErrorMm, kTriangles, kFormats, kDraco, kNormals,
-    kDistances, kLods, kMerge, kGlbCodec, kSpace;
+    kUntangle, kClose, kComponents, kFillCavities, kCrop, kMaxErrorMm, kTriangles, kFormats, kDraco,
+    kNormals, kDistances, kLods, kMerge, kGlbCodec, kSpace;
 extern const Parameter kVolume, kPriority, kCertify, kCallback;
 extern const Parameter kLabelName;  // of a member that a label names
 }  // namespace rows
@@ -196,6 +197,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   parameter(rows::kLambda, self.lambda);
   parameter(rows::kPassBand, self.pass_band);
   parameter(rows::kMaxDisplacementMm, self.max_displacement_mm);
+  if (is_told(self, self.untangle)) parameter(rows::kUntangle, self.untangle);
   parameter(rows::kClose, self.close);
   parameter(rows::kComponents, self.components);
   if (is_told(self, self.fill_cavities)) parameter(rows::kFillCavities, self.fill_cavities);

@@ -255,6 +255,9 @@ void complete(const Json& json, JobParameters& parameters, RequestReader& reader
     }
     parameters.certify = true;
   }
+  if (parameters.untangle && parameters.passes == 0) {
+    reader.add("untangle", "needs smoothing, but passes is 0: no vertex moves");
+  }
   const std::vector<double>& lods = parameters.lods;
   const bool is_falling = std::ranges::is_sorted(lods, std::ranges::greater_equal{});
   if (!lods.empty() && (lods.front() != 1 || !is_falling)) {

@@ -8,7 +8,17 @@
 
 namespace isomesh {
 
-enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
+enum class Stage {
+  kQueue,
+  kLoad,
+  kExtract,
+  kSmooth,
+  kUntangle,
+  kSimplify,
+  kEncode,
+  kCertify,
+  kDone
+};
 
 // Wall-clock milliseconds of each stage; 0 for a stage that has not run.
 struct Timing {
@@ -16,6 +26,7 @@ struct Timing {
   double load = 0;
   double extract = 0;
   double smooth = 0;
+  double untangle = 0;
   double simplify = 0;
   double encode = 0;
   double certify = 0;
@@ -37,6 +48,8 @@ inline constexpr std::array kStages = {
     StageRow{Stage::kLoad, "load", "Loading the samples into memory.", &Timing::load},
     StageRow{Stage::kExtract, "extract", "Marching tetrahedra.", &Timing::extract},
     StageRow{Stage::kSmooth, "smooth", "All smoothing passes.", &Timing::smooth},
+    StageRow{Stage::kUntangle, "untangle", "Removing self-intersections, if requested.",
+             &Timing::untangle, false},
     StageRow{Stage::kSimplify, "simplify", "Simplification, if fewer triangles are requested.",
              &Timing::simplify, false},
     StageRow{Stage::kEncode, "encode", "Writing the files and measuring the mesh.",

@@ -112,6 +112,29 @@ std::string bound_of(const Simplification& simplified) {
   return "topology: fewer triangles would open or fold the surface, or change its boundary";
 }
 
+std::string pairs_text(std::uint64_t pairs) {
+  return pairs == 1 ? "1 pair of triangles" : grouped(pairs) + " pairs of triangles";
+}
+
+void tell_crossings(const MeshSummary& mesh, const Units& in, Rows& rows) {
+  if (const auto& untangled = mesh.untangled) {
+    const std::string moved =
+        pairs_text(untangled->pairs) + "; " + grouped(untangled->vertices) + " vertices moved back";
+    rows.push_back({"untangled", untangled->pairs == 0 ? "nothing to do" : moved});
+    if (untangled->left > 0) {
+      rows.push_back({"", pairs_text(untangled->left) + " intersect as extracted"});
+    }
+  }
+  const auto& found = mesh.quality.self_intersections;
+  if (!found) return;
+  std::string text = found->pairs == 0 ? "none" : pairs_text(found->pairs);
+  if (!found->places.empty()) {
+    const auto& [x, y, z] = found->places.front();
+    text += ", the first at " + fixed(x, 2) + ", " + fixed(y, 2) + ", " + in.length(z, 2);
+  }
+  rows.push_back({"self-intersections", text});
+}
+
 void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (mesh.simplified) {
     rows.push_back({"simplified", "from " + grouped(mesh.simplified->triangles_before) +
@@ -217,10 +240,7 @@ std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
   }
   const MeshQuality& quality = mesh.quality;
   rows.push_back({"topology", topology_of(quality)});
-  if (const auto& found = quality.self_intersections) {
-    const std::string pairs = grouped(found->pairs) + " pairs of triangles";
-    rows.push_back({"self-intersections", found->pairs == 0 ? "none" : pairs});
-  }
+  tell_crossings(mesh, in, rows);
   rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
                                       fixed(quality.aspect_ratio.smoothed.mean, 3) + " smoothed"});
   rows.push_back({"smallest angle", fixed(quality.smallest_angle_deg.extracted.mean, 1) +

@@ -165,6 +165,8 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   job.parameters.fill_cavities = true;
   job.parameters.distances = true;
   job.parameters.certify = true;
+  job.parameters.untangle = true;
+  job.mesh->untangled.emplace();
   job.mesh->simplified.emplace();
   MeshCertificate& certificate = job.mesh->certificate.emplace();
   certificate.budget_mm.emplace();

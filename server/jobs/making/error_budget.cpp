@@ -18,11 +18,6 @@ constexpr double kSmoothingShare = 0.5;
 constexpr double kQuantisationShare = 0.1;
 constexpr int kMostBits = 30;  // of Draco
 
-bool has_rounded_files(const MeshParameters& parameters) {
-  return std::ranges::any_of(files_of(parameters),
-                             [&](MeshFormat file) { return codec::rounds(file, parameters); });
-}
-
 // Single precision moves a decoded coordinate by a few units of the largest one's last place.
 double rounding_mm(const codec::Grid& grid) {
   double largest = 0;
@@ -38,6 +33,24 @@ double quantisation_of(const codec::Grid& grid) {
 }
 
 }  // namespace
+
+bool has_rounded_files(const MeshParameters& parameters) {
+  return std::ranges::any_of(files_of(parameters),
+                             [&](MeshFormat file) { return codec::rounds(file, parameters); });
+}
+
+bool has_exact_files(const MeshParameters& parameters) {
+  return std::ranges::any_of(files_of(parameters),
+                             [&](MeshFormat file) { return !codec::rounds(file, parameters); });
+}
+
+mesh::Rounding rounding_of(const MeshParameters& parameters, const mesh::Mesh& mesh) {
+  const codec::Grid grid = codec::grid_of(mesh, parameters.draco.position_bits);
+  const auto rounded = [grid](const mesh::Vec3& at) {
+    return mesh::Vec3{grid.decoded(at[0], 0), grid.decoded(at[1], 1), grid.decoded(at[2], 2)};
+  };
+  return {.rounded = rounded, .most_mm = quantisation_of(grid)};
+}
 
 double most_displacement(const MeshParameters& parameters) {
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();

@@ -6,6 +6,7 @@
 
 #include "proto/types.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/smooth/untangle.h"
 
 namespace isomesh::jobs {
 
@@ -24,6 +25,13 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
 // vertices were moved by `moved_mm`, which enlarges the grid.
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
                        double moved_mm = 0);
+
+// True if a file of the job rounds coordinates, or if one does not.
+bool has_rounded_files(const MeshParameters& parameters);
+bool has_exact_files(const MeshParameters& parameters);
+
+// How files that round have the positions of the mesh.
+mesh::Rounding rounding_of(const MeshParameters& parameters, const mesh::Mesh& mesh);
 
 // A certificate measures no more points of each surface if the limit is proven: what is found is
 // then only told beside it.

@@ -170,9 +170,10 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   const mesh::SurfaceCount count = separate(samples, options, request, progress, walls);
   if (!is_simplified(parameters)) check_disk(walls.mesh, request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
-  const ExtractedSurface extracted(request, walls.mesh);
+  ExtractedSurface extracted(request, walls.mesh);
 
   smooth_walls(samples, options, count, request, progress, walls, summary);
+  untangle_stage(parameters, extracted, progress, walls.mesh, summary);
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, walls.mesh, &walls, summary);

@@ -139,9 +139,10 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   extract(samples, request, progress, mesh);
   leave_out_parts(parameters, progress, mesh, summary.dropped);
   if (!is_simplified(parameters)) check_disk(mesh, request);
-  const ExtractedSurface extracted(request, mesh);
+  ExtractedSurface extracted(request, mesh);
 
   smooth_stage(samples, request, progress, mesh, summary);
+  untangle_stage(parameters, extracted, progress, mesh, summary);
   const MeshParameters as_written = with_bits_for(parameters, mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, mesh, nullptr, summary);

@@ -8,6 +8,7 @@
 #include "server/jobs/making/error_budget.h"
 #include "server/mesh/labels/label_parts.h"
 #include "server/mesh/labels/separate.h"
+#include "server/mesh/smooth/untangle.h"
 #include "server/mesh/stairs/stairs.h"
 
 namespace isomesh::jobs {
@@ -24,8 +25,9 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
          2 * mesh_bytes(surface);
 }
 
-// The memory of simplifying and certifying, one after the other, beside the rest: the extracted
-// surface, grids of triangles, and files that round coordinates, both as bytes and decoded.
+// The memory of untangling, simplifying and certifying, one after the other, beside the rest: the
+// extracted surface, grids of triangles, and files that round coordinates, both as bytes and
+// decoded.
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                           const MeshParameters& parameters, bool certify) {
   // From simplify.h, bound.h and triangle_grid.h, and a little more.
@@ -44,7 +46,12 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
   // While files are encoded.
   const std::uint64_t grid = parameters.distances ? surface.triangles * kGridsPerTriangle : 0;
-  if (!certify) return std::max(simplifying, grid) + (keeps_extracted ? mesh_bytes(surface) : 0);
+  const std::uint64_t untangling = parameters.untangle ? mesh::untangling_memory(surface) : 0;
+  if (!certify) {
+    const std::uint64_t positions = parameters.untangle ? surface.vertices * sizeof(mesh::Vec3) : 0;
+    return std::max({untangling, simplifying, grid}) +
+           (keeps_extracted ? mesh_bytes(surface) : positions);
+  }
   double files = 0;
   for (const MeshFormat format : files_of(parameters)) {
     if (!codec::rounds(format, parameters)) continue;
@@ -53,7 +60,7 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
   const std::uint64_t certifying = static_cast<std::uint64_t>(files) +
                                    (files > 0 ? 3 * mesh_bytes(surface) : 0) +
                                    surface.triangles * kGridsPerTriangle;
-  return mesh_bytes(surface) + std::max({simplifying, certifying, grid});
+  return mesh_bytes(surface) + std::max({untangling, simplifying, certifying, grid});
 }
 
 // The least size of the files.

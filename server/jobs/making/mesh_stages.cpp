@@ -14,6 +14,7 @@
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/smooth/smooth.h"
+#include "server/mesh/smooth/untangle.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -110,8 +111,10 @@ bool is_simplified(const MeshParameters& parameters) {
 
 ExtractedSurface::ExtractedSurface(const MeshRequest& request, const mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
-  if (!request.certify && !parameters.max_error_mm && !parameters.distances) return;
+  const bool is_measured = request.certify || parameters.max_error_mm || parameters.distances;
+  if (!is_measured && !parameters.untangle) return;
   positions.assign(mesh.positions.begin(), mesh.positions.end());
+  if (!is_measured) return;
   triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
 }
 
@@ -145,6 +148,24 @@ void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& me
   summary.displacement_mm = {effect.mean_displacement_mm, effect.max_displacement_mm};
   summary.volume_mm3.extracted = effect.before.volume_mm3;
   set_extent(effect.after, summary);
+}
+
+void untangle_stage(const MeshParameters& parameters, ExtractedSurface& extracted,
+                    Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
+  if (!parameters.untangle) return;
+  progress.enter(Stage::kUntangle);
+  mesh::UntangleOptions options = {.extracted = extracted.positions};
+  // Simplification comes first otherwise; and files of labels have each wall twice.
+  if (!is_simplified(parameters) && !parameters.labels && has_rounded_files(parameters)) {
+    options.is_exact = has_exact_files(parameters);
+    options.rounding = [&](const mesh::Mesh& now) { return rounding_of(parameters, now); };
+  }
+  const mesh::UntangleEffect effect = mesh::untangle(options, progress.context(), mesh);
+  summary.untangled = {.pairs = effect.pairs, .vertices = effect.vertices, .left = effect.left};
+  if (extracted.triangles.empty()) extracted.positions = {};  // nothing else needs them
+  if (effect.vertices == 0) return;
+  summary.displacement_mm = {effect.mean_displacement_mm, effect.max_displacement_mm};
+  set_extent(measure_extent(mesh, progress.quiet()), summary);
 }
 
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {

@@ -28,7 +28,8 @@ bool is_simplified(const MeshParameters& parameters);
 
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso);
 
-// A copy of the extracted surface, if something is measured from it later; otherwise empty.
+// A copy of the extracted surface, if something is measured from it later; otherwise empty. Only
+// the positions if vertices move back to them (untangle_stage), and no more.
 struct ExtractedSurface {
   std::vector<mesh::Vec3> positions;
   std::vector<mesh::Triangle> triangles;
@@ -52,6 +53,12 @@ void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progre
 using Smooth = std::function<mesh::SmoothingEffect(const mesh::Context&)>;
 void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& mesh,
                   MeshSummary& summary);
+
+// Moves vertices back towards their extracted positions until the smoothed mesh does not intersect
+// itself, if the parameters ask for it, and writes the result into the summary. Frees the extracted
+// positions if nothing is measured from them.
+void untangle_stage(const MeshParameters& parameters, ExtractedSurface& extracted,
+                    Progress& progress, mesh::Mesh& mesh, MeshSummary& summary);
 
 // Simplifies the mesh if the parameters ask for it, and writes the result into the summary. `walls`
 // is the owner of the mesh, if it has one. The parameters have the bits of the files' coordinates.

@@ -19,6 +19,7 @@ constexpr double kLoadPerSample = 1.3e-6;
 constexpr double kExtractPerSample = 1.0e-6;
 constexpr double kExtractPerTriangle = 1.6e-5;
 constexpr double kMeasurePerTriangle = 3.0e-5;
+constexpr double kUntanglePerTriangle = 1.2e-3;
 constexpr double kSimplifyPerTriangle = 5.0e-4;
 constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
 constexpr double kLevelsPerTriangle = 7.5e-4;
@@ -37,6 +38,10 @@ double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   const mesh::SmoothingMethod& method = mesh::method_of(parameters.smoothing);
   return as_double(surface.triangles) *
          (method.ms_per_triangle + method.ms_per_triangle_and_pass * parameters.passes);
+}
+
+double untangle_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
+  return parameters.untangle ? kUntanglePerTriangle * as_double(surface.triangles) : 0;
 }
 
 double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
@@ -101,6 +106,7 @@ Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written,
   times.load = kMillisecondsPerJob + kLoadPerSample * as_double(volume.samples);
   times.extract = extract_ms(extracted, volume.samples);
   times.smooth = smooth_ms(extracted, parameters);
+  times.untangle = untangle_ms(extracted, parameters);
   times.simplify = simplify_ms(extracted, parameters);
   times.encode = encode_ms(written, parameters);
   if (certify) times.certify = certify_ms(extracted, written, volume, parameters);

@@ -53,6 +53,8 @@ def agree(body, volume, rng):
         body["crop"] = volume.box()
     if body.get("max_error_mm") is not None and "certify" in body:
         body["certify"] = True
+    if body.get("passes") == 0:
+        body.pop("untangle", None)
     if body.get("smoothing") == "taubin" and body.get("lambda"):
         body["lambda"] = min(body["lambda"], 0.66)
     if "labels" in body:

@@ -142,7 +142,8 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
   mesh.certificate->from_mesh = {.max_mm = 0.05, .mean_mm = 0.01, .p99_mm = 0.04};
   mesh.certificate->from_extracted = {.max_mm = 0.09876, .mean_mm = 0.02, .p99_mm = 0.03};
   mesh.certificate->budget_mm = {.smoothing = 0.05, .quantisation = 0.01, .simplification = 0.04};
-  mesh.quality.self_intersections = {.pairs = 3, .triangles = 5};
+  mesh.quality.self_intersections = {.pairs = 3, .triangles = 5, .places = {{1, -2.5, 30}}};
+  mesh.untangled = {.pairs = 1200, .vertices = 3400, .left = 1};
   const std::string report = mesh_report(mesh);
   EXPECT_THAT(report, HasSubstr("iso-value           61.5\n"));
   EXPECT_THAT(report, HasSubstr("from 5,000 triangles, bound by the number of triangles\n"));
@@ -150,7 +151,13 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
               HasSubstr("0.0988 mm from the extracted surface, measured on the stl file\n"));
   EXPECT_THAT(report, HasSubstr("to the file       0.0988 mm at most, 0.0300 mm for 99 %"));
   EXPECT_THAT(report, HasSubstr("0.0500 mm smoothing, 0.0400 mm simplification, 0.0100 mm"));
-  EXPECT_THAT(report, HasSubstr("self-intersections  3 pairs of triangles\n"));
+  EXPECT_THAT(report,
+              HasSubstr("self-intersections  3 pairs of triangles, the first at 1.00, -2.50, "
+                        "30.00 mm\n"));
+  EXPECT_THAT(report,
+              HasSubstr("untangled           1,200 pairs of triangles; 3,400 vertices moved "
+                        "back\n                      1 pair of triangles intersect as "
+                        "extracted\n"));
   mesh.simplified->bound_by = Simplification::Bound::kTopology;
   EXPECT_THAT(mesh_report(mesh), HasSubstr("bound by the topology: fewer triangles would open"));
 }

@@ -84,10 +84,13 @@ Job certified_job() {
   job.parameters.distances = true;
   job.parameters.components.nearest_to = {{1, 2, 3}, {4, 5, 6}};
   job.parameters.certify = true;
+  job.parameters.untangle = true;
+  job.timing.untangle = 12;
   MeshSummary& mesh = *job.mesh;
   mesh.iso = 61.5;
   mesh.empty = true;
   mesh.simplified = {.triangles_before = 7, .bound_by = Simplification::Bound::kTriangles};
+  mesh.untangled = {.pairs = 4, .vertices = 9, .left = 1};
   mesh.quality.encloses_volume = true;
   mesh.quality.self_intersections = {.pairs = 3, .triangles = 5, .places = {{1, 2, 3}}};
   mesh.certificate.emplace();
@@ -105,14 +108,25 @@ TEST(JobJson, OfTheErrorComesBackTheSame) {
   EXPECT_EQ(job_from_json(to_json(certified_job())), certified_job());
 }
 
+// Records of a version without the stage.
+TEST(JobJson, MayLackTimesOfStagesThatAreNotAlwaysRun) {
+  Job job = certified_job();
+  json text = json::parse(to_record(job));
+  EXPECT_EQ(text["timing"].erase("untangle"), 1U);
+  job.timing.untangle = 0;
+  EXPECT_EQ(job_from_record(text.dump()), job);
+  text["timing"].erase("smooth");
+  EXPECT_THROW(job_from_record(text.dump()), Error);
+}
+
 TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {
   const json job = json::parse(to_json(succeeded_job()));
-  for (const char* const name :
-       {"max_error_mm", "triangles", "lods", "crop", "fill_cavities", "distances", "certify"}) {
+  for (const char* const name : {"max_error_mm", "triangles", "lods", "crop", "fill_cavities",
+                                 "distances", "certify", "untangle"}) {
     EXPECT_FALSE(job["parameters"].contains(name)) << name;
   }
   EXPECT_FALSE(job["parameters"]["components"].contains("nearest_to"));
-  for (const char* const name : {"iso", "simplified", "certificate"}) {
+  for (const char* const name : {"iso", "untangled", "simplified", "certificate"}) {
     EXPECT_FALSE(job["mesh"].contains(name)) << name;
   }
   EXPECT_FALSE(job["mesh"]["quality"].contains("self_intersections"));

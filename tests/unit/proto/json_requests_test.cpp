@@ -235,6 +235,14 @@ TEST(JobBody, ABoundForTheErrorIsMeasured) {
   EXPECT_THAT(faults_of(R"("triangles": 3)"), ElementsAre("triangles"));
 }
 
+TEST(JobBody, UntanglingNeedsSmoothing) {
+  EXPECT_TRUE(parsed(R"("untangle": true)").untangle);
+  EXPECT_FALSE(parsed("").untangle);
+  EXPECT_THAT(faults_of(R"("untangle": true, "passes": 0)"), ElementsAre("untangle"));
+  EXPECT_THAT(faults_of(R"("untangle": false, "passes": 0)"), ElementsAre());
+  EXPECT_THAT(faults_of(R"("untangle": 1)"), ElementsAre("untangle"));
+}
+
 TEST(JobBody, PlacesOfPartsAreOfThreeNumbers) {
   const auto at = [](const std::string& list) {
     return R"("components": {"nearest_to": )" + list + "}";

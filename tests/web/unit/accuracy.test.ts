@@ -3,7 +3,7 @@ import type { Job } from '@/api/types';
 import { changeOf } from '@/job/changes';
 import { emptyReason } from '@/job/empty';
 import { millimetres } from '@/ui/format';
-import { histogramPath } from '@/views/jobs/certificate';
+import { histogramPath, untangledText } from '@/views/jobs/certificate';
 import { stepsOf, totalOf } from '@/views/jobs/charts';
 import { errorAt, errorInWords, placeOf } from '@/views/prepare/error_slider';
 import { keepOnlyAt } from '@/views/surface/picked_part';
@@ -70,6 +70,16 @@ describe('a certificate', () => {
     const [, last] = places.at(-2) ?? [];
     expect(last).toBeLessThan(64 - 5);
     expect(histogramPath({ points: 1, max_mm: 0, mean_mm: 0, rms_mm: 0, p99_mm: 0, histogram }, 1, 99)).toBe('');
+  });
+});
+
+describe('removing self-intersections', () => {
+  it('is told with its pairs, what it moved, and what is left', () => {
+    const text = (pairs: number, vertices: number, left: number): string => untangledText({ untangled: { pairs, vertices, left } });
+    expect(text(0, 0, 0)).toBe('nothing intersected');
+    expect(text(1, 4, 0)).toBe('1 pair of triangles, 4 vertices moved back');
+    expect(text(1200, 3400, 2)).toMatch(/^1\D?200 pairs of triangles, 3\D?400 vertices moved back; 2 pairs of triangles intersect as extracted$/);
+    expect(untangledText({})).toBe('');
   });
 });
 

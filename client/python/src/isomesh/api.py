@@ -277,6 +277,7 @@ Smoothing = Literal['laplacian', 'taubin', 'angle', 'optimize', 'labels']
 Lambda = Union['Optional[float]']
 PassBand = float
 MaxDisplacement = Union['Optional[float]']
+Untangle = bool
 Close = bool
 #: Keep the N largest connected components.
 Keep = Union['Optional[int]']
@@ -340,6 +341,7 @@ class _Parameters(TypedDict, total=False):
     smoothing: Smoothing
     pass_band: PassBand
     max_displacement_mm: MaxDisplacement
+    untangle: Untangle
     close: Close
     components: JobParametersComponents
     fill_cavities: FillCavities
@@ -442,6 +444,13 @@ class JobOptions(_Parameters, total=False):
         Smoothing moves no vertex farther than this from its extracted position. In millimetres.
         Null means no limit; but labels that are smoothed by laplacian or taubin move half the
         smallest spacing at most.
+
+    untangle
+        Remove the self-intersections that smoothing makes: move vertices back towards their
+        extracted positions. The vertices of triangles that intersect move back by half, again
+        and again, until no triangles intersect; at worst to where they were extracted. It needs
+        smoothing, so passes must not be 0. mesh.untangled says what was found and moved.
+        certify counts again, also in files that round coordinates.
 
     close
         Cap the surface where it meets the volume's border. Samples beyond the border then count
@@ -597,7 +606,7 @@ class JobReport(TypedDict):
 
 
 #: The current stage of a job, or its last one.
-Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
+Stage = Literal['queue', 'load', 'extract', 'smooth', 'untangle', 'simplify', 'encode', 'certify', 'done']
 
 
 class Timing(TypedDict):
@@ -611,6 +620,8 @@ class Timing(TypedDict):
     extract: float
     #: All smoothing passes.
     smooth: float
+    #: Removing self-intersections, if requested.
+    untangle: float
     #: Simplification, if fewer triangles are requested.
     simplify: float
     #: Writing the files and measuring the mesh.
@@ -626,6 +637,18 @@ class MeshSummaryDropped(TypedDict):
 
     components: int
     triangles: int
+
+
+class MeshSummaryUntangled(TypedDict):
+    """Only for a job with untangle."""
+
+    #: Pairs of triangles that intersected after smoothing.
+    pairs: int
+    #: Vertices that moved back towards their extracted positions.
+    vertices: int
+    #: Pairs that still intersect. Their vertices stand where they were extracted, so the extracted
+    #: surface has these intersections, too.
+    left: int
 
 
 class MeshSummarySimplified(TypedDict):
@@ -649,7 +672,7 @@ class MeshSummaryVolumeMm3(TypedDict):
 
 
 class MeshSummaryDisplacementMm(TypedDict):
-    """How far smoothing moved the vertices from their extracted positions."""
+    """How far smoothing moved the vertices from their extracted positions, after untangle."""
 
     mean: float
     max: float
@@ -676,6 +699,7 @@ class MeshSummary(TypedDict):
     #: Vertices - edges + triangles.
     euler: int
     dropped: MeshSummaryDropped
+    untangled: NotRequired[MeshSummaryUntangled]
     simplified: NotRequired[MeshSummarySimplified]
     quality: MeshQuality
     area_mm2: float
@@ -782,7 +806,9 @@ class LabelFile(TypedDict):
 
 class MeshQualitySelfIntersections(TypedDict):
     """Pairs of triangles that intersect at more than their shared corners and edges, computed
-    exactly. Only for a job with certify."""
+    exactly: in the decoded file that has the most, with its vertices at the same place as one.
+    Of labels in the walls, before files round their coordinates. Only for a job with
+    certify."""
 
     pairs: int
     #: Triangles that intersect another one.

@@ -99,14 +99,25 @@ export function certificateBody(job: Job): HTMLElement | null {
   ]);
 }
 
+function pairsText(pairs: number): string {
+  return pairs === 1 ? '1 pair of triangles' : `${formatCount(pairs)} pairs of triangles`;
+}
+
+// '' unless the job removed intersections.
+export function untangledText({ untangled }: Pick<MeshSummary, 'untangled'>): string {
+  if (!untangled) return '';
+  if (untangled.pairs === 0) return 'nothing intersected';
+  const left = untangled.left === 0 ? '' : `; ${pairsText(untangled.left)} intersect as extracted`;
+  return `${pairsText(untangled.pairs)}, ${formatCount(untangled.vertices)} vertices moved back${left}`;
+}
+
 export function intersectionsText({ quality }: MeshSummary): Child {
   const found = quality.self_intersections;
   if (!found) return '';
   if (found.pairs === 0) return 'none';
   const [first] = found.places;
   const at = first ? ` The first pair is at ${first.map(formatSize).join(', ')} mm.` : '';
-  const pairs = found.pairs === 1 ? '1 pair' : `${formatCount(found.pairs)} pairs`;
-  return h('span.attention', { title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
+  return h('span.attention', { title: `These triangles intersect.${at}` }, pairsText(found.pairs));
 }
 
 // The reason why a surface encloses no volume.

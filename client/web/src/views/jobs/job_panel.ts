@@ -12,7 +12,7 @@ import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
 import { exportActions } from './export_section';
-import { certificateBody, intersectionsText, openText } from './certificate';
+import { certificateBody, intersectionsText, openText, untangledText } from './certificate';
 import { distributionChart, stepsOf, totalOf, waterfall, type Durations } from './charts';
 
 export function section(title: string, ...children: Child[]): HTMLElement {
@@ -80,6 +80,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
     ['Connected components', componentsText(job, mesh)],
     ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
+    ['Untangled', untangledText(mesh)],
     ['Self-intersections', intersectionsText(mesh)],
     ['Moved by smoothing', job.parameters.passes > 0 ? `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm` : ''],
   ];
