@@ -193,8 +193,9 @@ void answer_volumes(App& app, const Request& request, Response& response, const 
   const std::vector<UploadedVolume> volumes = imported(app, request, response, body);
   const UploadedVolume& only = volumes.front();
   const bool is_one = volumes.size() == 1 && only.volume;
-  // Another volume of the archive may be requested later.
-  if (only.volume && !body.name.empty() && !request.has_parameter("member")) {
+  // Another volume of the archive may be requested later, and another series.
+  const bool is_one_of_several = request.has_parameter("member") || request.has_parameter("series");
+  if (only.volume && !body.name.empty() && !is_one_of_several) {
     app.kept.finish(owner_of(request), body.name, is_one ? to_json(*only.volume) : std::string());
   }
   if (!is_one) {

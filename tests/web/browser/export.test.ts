@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { describe, expect } from 'vitest';
-import { ballNrrd, madeJob, openSurface, setup } from './support';
+import { ballNrrd, ballsNrrd, madeJob, noiseNrrd, openSurface, setup, surfaceLoaded } from './support';
 
 const { at, it } = setup();
 
@@ -25,12 +25,48 @@ describe('a surface', () => {
     await expect.poll(() => page.locator('[data-format=stl]').count()).toBe(1);
     await expect.poll(() => page.getByRole('button', { name: 'For 3D printing' }).count()).toBe(0);
     const made = await madeJob(at);
-    expect(made.parameters).toMatchObject({ close: true, certify: true });
+    expect(made.parameters).toMatchObject({ close: true, certify: true, fill_cavities: true, smoothing: 'taubin', max_error_mm: 0.2, components: { keep: 1 } });
     const { name, bytes } = await saved(page, /^Certificate$/);
     expect(name).toMatch(/-certificate\.json$/);
     const told = JSON.parse(bytes.toString()) as { certificate: { found_mm: number }; files: Record<string, { sha256: string }> };
     expect(told.certificate.found_mm).toBe(made.mesh?.certificate?.found_mm);
     expect(told.files['3mf']?.sha256).toBe(made.mesh?.files['3mf']?.sha256);
+  });
+
+  it('for printing is one closed component, and says in plain words that it is ready', async ({ page, daemon }) => {
+    const volume = await daemon.upload(ballsNrrd(40));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+    await page.getByRole('radio', { name: 'For printing', exact: true }).check({ force: true });
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    const points = page.locator('.print-check li');
+    await expect.poll(() => points.count()).toBe(7);
+    const made = await madeJob(at);
+    expect(made.mesh?.components).toBe(1);
+    expect(made.mesh?.certificate).toMatchObject({ proven: true });
+    expect(await page.locator('.print-check [data-state=bad]').count()).toBe(0);
+    expect(await page.locator('.print-check [data-state=good]').count()).toBe(4);
+    const text = await page.locator('.print-check').innerText();
+    expect(text).toMatch(/One connected component/);
+    expect(text).toMatch(/Nowhere more than 0\.\d+ mm from the scan. This is proven/);
+    expect(text).toMatch(/STL [\d.]+ KB/);
+    expect(text).not.toMatch(/max_error_mm|certif/i);
+  });
+
+  it('for printing that is not ready names what is wrong, shows where, and offers what helps', async ({ page, daemon }) => {
+    const volume = await daemon.upload(noiseNrrd(20));
+    const { id, mesh } = await daemon.make({ volume, iso: 128, passes: 60, certify: true, formats: ['glb', 'stl', '3mf'] });
+    expect(mesh?.components).toBeGreaterThan(1);
+    await openSurface(at, id);
+    const bad = page.locator('.print-check [data-state=bad]');
+    await expect.poll(() => bad.count()).toBe(3);
+    expect(await page.locator('.print-check').innerText()).toMatch(/Open at .* edges/);
+    await bad.getByRole('button', { name: 'Show them' }).click();
+    await expect.poll(() => page.locator('.pane').getAttribute('data-marks')).toMatch(/^[1-9]/);
+    await bad.getByRole('button', { name: 'Make it without smoothing' }).click();
+    await expect.poll(() => page.url()).not.toContain(id);
+    await surfaceLoaded(page);
+    await madeJob(at);
+    await expect.poll(() => page.locator('.print-check').innerText()).toMatch(/No triangle crosses another one/);
   });
 
   it('is saved for a phone, and simplified first where it is large', async ({ page, daemon }) => {

@@ -97,6 +97,20 @@ describe('a slice', () => {
     await expect.poll(() => page.locator('.iso-input').inputValue()).toBe(String(told));
   });
 
+  it('moves by the distance of a wheel, also of a trackpad', async ({ page }) => {
+    await open(page, '&at=24,24,24');
+    const place = page.locator('[data-plane=axial] .slice-place');
+    await page.locator('[data-plane=axial] canvas').hover();
+    for (let event = 0; event < 40; event += 1) await page.mouse.wheel(0, 2);
+    await expect.poll(() => place.innerText()).toBe('28 / 48');
+    for (let notch = 0; notch < 3; notch += 1) await page.mouse.wheel(0, -100);
+    await expect.poll(() => place.innerText()).toBe('25 / 48');
+    await page.keyboard.down('Control');
+    for (let notch = 0; notch < 5; notch += 1) await page.mouse.wheel(0, -100);
+    await page.keyboard.up('Control');
+    await expect.poll(() => page.locator('[data-plane=axial] .slice-zoom').innerText()).toMatch(/^1\.6/);
+  });
+
   it('of a tilted gantry leans as the slices lie', async ({ page, daemon }) => {
     const volume = await daemon.upload(tiltedNrrd(40, 18.5));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=150&window=0,255`);

@@ -177,6 +177,44 @@ describe('an upload of several volumes', () => {
     await groups.nth(1).getByRole('button').click();
     await page.waitForURL(volumePage);
   });
+
+  it('reads several series of one upload, and offers the others until a person says no', async ({ page, daemon }) => {
+    const queries: string[] = [];
+    page.on('request', (request) => {
+      if (request.method() === 'POST' && request.url().includes('/v1/volumes')) queries.push(new URL(request.url()).search);
+    });
+    await page.goto(daemon.url);
+    const study = { patient: 'Roe^Ann', uid: '1.7.1', title: 'Chest' };
+    const slices = ['lung', 'bone', 'liver', 'scout'].flatMap((name, n) =>
+      [1, 2].map((index) => ({ name: `${name}${index}.dcm`, bytes: ctSlice(100 + 10 * n + index, `1.10.${n}`, name, `1.8.${n}`, study) })),
+    );
+    await drop(page, slices);
+    const panel = page.locator('.drop');
+    await page.getByRole('heading', { name: 'Which series?' }).waitFor();
+    await expect.poll(() => panel.locator('.choice canvas').count()).toBe(4);
+    const marks = panel.getByRole('checkbox');
+    await marks.nth(0).check();
+    await marks.nth(2).check();
+    await page.getByRole('button', { name: 'Read the 2 marked' }).click();
+    await page.getByRole('heading', { name: '2 more series are in this upload' }).waitFor();
+    // Its cards are named after patient and series.
+    const names = page.locator('.card strong');
+    await expect.poll(async () => (await names.allInnerTexts()).filter((name) => name.startsWith('Roe Ann')).sort()).toEqual([
+      'Roe Ann, liver, 2024-05-17',
+      'Roe Ann, lung, 2024-05-17',
+    ]);
+    await expect.poll(() => panel.locator('.choices .stored a').count()).toBe(2);
+    // One of the others, which is opened, and the last one is still there.
+    await panel.getByRole('button', { name: 'bone' }).click();
+    await page.waitForURL(volumePage);
+    await page.goBack();
+    await page.getByRole('heading', { name: '1 more series is in this upload' }).waitFor();
+    await page.getByRole('button', { name: 'No more of these' }).click();
+    await page.getByRole('heading', { name: 'Drop a volume here' }).waitFor();
+    // The files were sent once.
+    expect(queries.filter((query) => !query.includes('upload=')).length).toBe(1);
+    expect(queries.length).toBe(4);
+  });
 });
 
 describe('a refusal', () => {

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { Box3, Mesh } from 'three';
 import type { Job } from '@/api/types';
-import { certificateFile, printingVariant } from '@/job/printing';
+import { certificateFile } from '@/job/printing';
 import { prepare } from '@/mesh/blocks';
 import { sceneOf } from '@/mesh/usdz';
 
@@ -21,12 +21,6 @@ describe('a surface for a phone', () => {
 });
 
 describe('a surface for a printer', () => {
-  it('is closed, measured, and comes in the formats of printers beside those that it has', () => {
-    const parameters = { formats: ['glb', 'ply'], close: false } as unknown as Job['parameters'];
-    expect(printingVariant(parameters)).toMatchObject({ close: true, certify: true });
-    expect([...(printingVariant(parameters).formats ?? [])].sort()).toEqual(['3mf', 'glb', 'ply', 'stl']);
-  });
-
   it('has a certificate that names its files by their digests, and no address', () => {
     const job = {
       id: 'j',

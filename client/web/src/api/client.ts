@@ -99,8 +99,9 @@ export class Client {
     });
   }
 
-  async eraseVolume(id: string): Promise<void> {
-    await this.connection.send(volumePath(id), { method: 'DELETE' });
+  /** Erases the volume, and with `jobs: 'erase'` all jobs on it with their files. */
+  async eraseVolume(id: string, { jobs }: { jobs?: 'keep' | 'erase' } = {}): Promise<void> {
+    await this.connection.send(`${volumePath(id)}${queryOf({ jobs })}`, { method: 'DELETE' });
   }
 
   histogramOf(id: string, bins: number, signal?: GlobalAbortSignal): Promise<Histogram> {
@@ -189,6 +190,11 @@ export class Client {
       cursor = page.next;
     }
     return labels;
+  }
+
+  /** Erases a job that has ended, and its files. */
+  async eraseJob(id: string): Promise<void> {
+    await this.connection.send(jobPath(id), { method: 'DELETE' });
   }
 
   cancelJob(id: string): Promise<Job> {

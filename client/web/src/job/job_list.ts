@@ -58,6 +58,12 @@ export class JobList {
     return this.afterOthers(() => this.loadPage());
   }
 
+  // It was erased.
+  forget(id: string): void {
+    const others = (jobs: readonly Job[]): Job[] => jobs.filter((job) => job.id !== id);
+    [this.jobs, this.loaded, this.ended] = [others(this.jobs), others(this.loaded), others(this.ended)];
+  }
+
   // Places in the queue, from 1. Empty where they are not known.
   places(): Map<string, number> {
     return new Map(this.hasWholeQueue ? inOrder(this.queued).map(({ id }, at) => [id, at + 1]) : []);

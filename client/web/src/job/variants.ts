@@ -2,25 +2,46 @@
 import { client } from '../client';
 import type { Job, JobParameters, Volume } from '../api/types';
 import { shortId } from '../ui/format';
-import { tell, tellError } from '../ui/notices';
+import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import { fileStem } from '../volume/names';
-import { defaultParameters, jobRequest, queryOfParameters, surfaceInNames, variantOf } from './parameters';
+import { defaultParameters, jobRequest, queryOfParameters, surfaceInNames, surfaceInWords, variantOf } from './parameters';
+import { forPrinting } from './printing';
 
 // Makes the same surface with other parameters, or finds it made already.
 export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
   return client.submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
+// The same surface, for a printer.
+export function makePrintable({ parameters }: Job, spacing: readonly number[]): void {
+  client.submitJob(jobRequest(forPrinting(parameters, spacing))).then(started, tellError);
+}
+
+function started({ id }: Job): void {
+  tell('A new job was started.');
+  go(['jobs', id]);
+}
+
 export type MakeVariant = (variant: Partial<JobParameters>) => void;
 
 // Starts a job with these changes and goes to it.
 export function makeVariant(job: Job): MakeVariant {
-  return (variant) =>
-    void submitVariant(job, variant).then(({ id }) => {
-      tell('A new job was started.');
-      go(['jobs', id]);
-    }, tellError);
+  return (variant) => void submitVariant(job, variant).then(started, tellError);
+}
+
+// Asks first. Resolves with true once the job and its files are erased.
+export async function eraseJob(job: Job): Promise<boolean> {
+  const title = job.mesh ? 'Erase this surface?' : 'Erase this job?';
+  if (!(await ask(title, `${surfaceInWords(job.parameters)}: the job and its files will be removed from the server. The volume stays.`, 'Erase'))) return false;
+  try {
+    await client.eraseJob(job.id);
+    tell(job.mesh ? 'The surface was erased.' : 'The job was erased.');
+    return true;
+  } catch (error) {
+    tellError(error);
+    return false;
+  }
 }
 
 // The file name of a surface: head-iso-60.glb.

@@ -70,11 +70,11 @@ function showDialog(title: string, content: Child, action: HTMLButtonElement, di
   });
 }
 
-// Resolves with true when the person agrees.
-export function ask(title: string, text: string, action: string): Promise<boolean> {
+// Resolves with true when the person agrees. `more` are choices below the text.
+export function ask(title: string, text: string, action: string, more: Child = null): Promise<boolean> {
   const dialog = h('dialog.dialog', { 'aria-label': title });
   const agree = button(action, () => dialog.close('yes'), { class: 'danger' });
-  return showDialog(title, h('p', text), agree, dialog);
+  return showDialog(title, h('div.stack', h('p', text), more), agree, dialog);
 }
 
 // Resolves with the text that the person enters, which may be empty, or null.

@@ -1,4 +1,5 @@
 // Packs the dropped or chosen files into one body to upload.
+import type { Volume } from '../api/types';
 import { packTar, type NamedFile } from './tar';
 
 function readEntries(reader: FileSystemDirectoryReader): Promise<FileSystemEntry[]> {
@@ -40,6 +41,8 @@ export interface Gathered {
   body: Blob;
   // Under which the daemon keeps the body while something of it is to be chosen.
   kept?: string;
+  // What was made of its series so far, by their UIDs.
+  stored: Map<string, Volume>;
 }
 
 // One file goes as it is, several are packed: all of them, since the server skips what is no part of a
@@ -47,7 +50,7 @@ export interface Gathered {
 export function gather(files: NamedFile[]): Gathered | null {
   const [first] = files;
   if (first === undefined) return null;
-  if (files.length === 1) return { name: first.path, count: 1, files, body: first.file };
+  if (files.length === 1) return { name: first.path, count: 1, files, body: first.file, stored: new Map() };
   const folder = first.path.includes('/') ? first.path.split('/')[0] : undefined;
-  return { name: folder ?? `${files.length} files`, count: files.length, files, body: packTar(files) };
+  return { name: folder ?? `${files.length} files`, count: files.length, files, body: packTar(files), stored: new Map() };
 }

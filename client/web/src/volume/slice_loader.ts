@@ -1,4 +1,4 @@
-// Brings the slice that is wanted: one request at a time, of which the next is for what is wanted last.
+// Brings the slice that is wanted and, while somebody steps through slices, those ahead.
 import { onReconnect } from '../client';
 import { delayAfter } from '../api/busy';
 import { asApiError, mayPass, type ApiError } from '../api/problem';
@@ -24,6 +24,11 @@ interface Wanted {
 // Sooner nobody notices that a slice is not there yet.
 const lateAfter = 250;
 const retryDelays = [1000, 2000, 4000, 8000];
+// A browser has six connections to a server, for all planes. Without steps, only the last wish counts.
+const mostRequests = { atRest: 1, stepping: 4 };
+const mostAhead = 8;
+// A longer way is a jump, which does not tell where the next one goes.
+const longestStep = 5;
 
 export class SliceLoader {
   // The one that is wanted, or the last one that was there; null also when the one that is wanted failed.
@@ -32,7 +37,9 @@ export class SliceLoader {
   error: ApiError | null = null;
   isLate = false;
   private wanted: Wanted | null = null;
-  private isBusy = false;
+  // 1 and -1 while somebody steps up and down.
+  private direction = 0;
+  private readonly requested = new Set<string>();
   private failures = 0;
   private retry = 0;
   private late = 0;
@@ -40,6 +47,7 @@ export class SliceLoader {
   constructor(
     private readonly source: Pick<SliceSource, 'find' | 'get'>,
     private readonly axis: Axis,
+    private readonly count: number,
     private readonly scope: Scope,
     private readonly host: SliceLoaderHost,
   ) {
@@ -53,6 +61,11 @@ export class SliceLoader {
   want(index: number, window: Window, map: LabelMap | null = null): void {
     const key = sliceKey(this.axis, index, window, map);
     if (key === this.wanted?.key) return;
+    const step = index - (this.wanted?.index ?? index);
+    const direction = Math.abs(step) <= longestStep ? Math.sign(step) : 0;
+    // Nothing waits for slices that lie ahead on another way.
+    if (direction !== this.direction) this.requested.clear();
+    this.direction = direction;
     this.wanted = { key, index, window, map };
     this.error = null;
     this.failures = 0;
@@ -65,7 +78,8 @@ export class SliceLoader {
     if (!wanted || this.scope.isOver) return;
     const found = this.source.find(this.axis, wanted.index, wanted.window, wanted.map);
     if (found) this.show(found);
-    else if (!this.isBusy) void this.fetch(wanted);
+    else this.fetch(wanted);
+    this.fetchAhead(wanted);
     if (!found && this.late === 0) {
       this.late = window.setTimeout(() => {
         this.isLate = this.slice?.index !== this.wanted?.index;
@@ -74,22 +88,36 @@ export class SliceLoader {
     }
   }
 
-  private async fetch(wanted: Wanted): Promise<void> {
-    this.isBusy = true;
-    let slice: Slice | null = null;
-    let error: ApiError | null = null;
-    try {
-      slice = await this.source.get(this.axis, wanted.index, wanted.window, wanted.map);
-    } catch (caught) {
-      error = asApiError(caught);
+  private fetchAhead({ index: from, window, map }: Wanted): void {
+    for (let ahead = 1; this.direction !== 0 && ahead <= mostAhead; ahead += 1) {
+      const index = from + ahead * this.direction;
+      if (index < 0 || index >= this.count) return;
+      if (this.source.find(this.axis, index, window, map)) continue;
+      this.fetch({ key: sliceKey(this.axis, index, window, map), index, window, map });
     }
-    this.isBusy = false;
+  }
+
+  // Does nothing if that many requests are under way that this one has to wait.
+  private fetch(wanted: Wanted): void {
+    const most = this.direction === 0 ? mostRequests.atRest : mostRequests.stepping;
+    if (this.requested.size >= most || this.requested.has(wanted.key)) return;
+    this.requested.add(wanted.key);
+    void this.source.get(this.axis, wanted.index, wanted.window, wanted.map).then(
+      (slice) => this.settle(wanted, slice, null),
+      (error: unknown) => this.settle(wanted, null, asApiError(error)),
+    );
+  }
+
+  private settle({ key, index }: Wanted, slice: Slice | null, error: ApiError | null): void {
+    this.requested.delete(key);
     if (this.scope.isOver) return;
-    const isWanted = this.wanted?.key === wanted.key;
-    // One on the way to what is wanted is nearer than the one before.
-    if (slice) this.show(slice);
-    else if (error && isWanted) this.fail(error);
-    if (!isWanted) this.load();
+    const isWanted = this.wanted?.key === key;
+    const distance = (from: number | undefined): number => Math.abs((from ?? Infinity) - (this.wanted?.index ?? 0));
+    // One on the way to what is wanted is shown until that is there.
+    if (slice && (isWanted || distance(index) < distance(this.slice?.index))) this.show(slice);
+    else if (error) this.direction = 0;
+    if (error && isWanted) this.fail(error);
+    else if (!isWanted || this.direction !== 0) this.load();
   }
 
   private show(slice: Slice): void {

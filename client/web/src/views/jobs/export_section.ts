@@ -1,9 +1,9 @@
 // Exports beside the files of a job: for a 3D printer, for a phone, and the certificate of the measurements.
 import type { Job, Volume } from '../../api/types';
 import { withShownGlb } from '../../job/parameters';
-import { certificateFile, isForPrinting, printingVariant } from '../../job/printing';
+import { certificateFile, isForPrinting } from '../../job/printing';
 import { isByLabels } from '../../job/table';
-import { fileNameOf, makeVariant } from '../../job/variants';
+import { fileNameOf, makePrintable, makeVariant } from '../../job/variants';
 import { viewableFile } from '../../mesh/shown';
 import { button, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
@@ -42,9 +42,9 @@ export function exportActions(job: Job, volume: Volume | null): HTMLElement | nu
     canMake &&
       !isForPrinting(job) &&
       !isByLabels(parameters) &&
-      button('For 3D printing', () => make(printingVariant(parameters)), {
+      button('For 3D printing', () => makePrintable(job, volume.spacing), {
         class: 'chip',
-        title: 'Starts a job that closes the surface, measures its error, and makes STL and 3MF',
+        title: 'Starts a job that keeps the largest component, fills cavities, closes the surface, proves its error, and makes STL and 3MF',
       }),
     viewableFile(job) !== null && (canMake || !isLarge) && phone,
     mesh.certificate &&

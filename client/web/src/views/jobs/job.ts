@@ -6,17 +6,18 @@ import { isFinal, type Job, type JobParameters, type Volume } from '../../api/ty
 import { emptyReason } from '../../job/empty';
 import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords, surfaceInWords } from '../../job/parameters';
-import { changeLink } from '../../job/variants';
+import { changeLink, eraseJob } from '../../job/variants';
 import { surfaceDrawing } from '../../scene/graphics';
 import { placeOfText } from '../../scene/views';
 import { button, h } from '../../ui/dom';
 import { formatIso, shortId } from '../../ui/format';
 import { refusal, tellError } from '../../ui/notices';
-import { noteInAddress, type Route } from '../../ui/route';
+import { go, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { volumeName } from '../../volume/names';
 import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
 import { SlicesBeside } from './job_slices';
+import { printCheck } from './print_check';
 import { LabelList } from '../labels/label_list';
 import { SurfacePane } from '../surface/surface_pane';
 import { cameraNote } from '../surface/view_tools';
@@ -51,6 +52,7 @@ function head(job: Job, volume: Volume | null): HTMLElement {
     h('p', inWords(job.parameters)),
     h('p.links', [
       volume && h('a', { href: changeLink(job) }, 'Change parameters'),
+      isFinal(job.state) && button('Erase', () => void eraseJob(job).then((isErased) => isErased && go(['jobs'])), { class: 'link' }),
       h('span.faint', `job ${shortId(job.id)}`),
     ]),
   ]);
@@ -176,9 +178,11 @@ function showSurface(
   pane.onCamera = cameraNote(scope);
   stageArea.replaceChildren(pane.element);
   const times = timings(job);
+  const check = printCheck(job, (places) => pane.mark(places));
   panel.replaceChildren(
     head(job, volume),
     ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
+    check ? section('Before you print', check) : '',
     section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),
     accuracy(job) ?? '',
     times,

@@ -3,6 +3,7 @@ import { client, token } from '../../client';
 import { isFinal, type Job } from '../../api/types';
 import { inOrder, JobList, mostOfState } from '../../job/job_list';
 import { inWords, surfaceInWords } from '../../job/parameters';
+import { eraseJob } from '../../job/variants';
 import { button, h } from '../../ui/dom';
 import { formatCount, formatMilliseconds, formatTime, shortId } from '../../ui/format';
 import { tellError } from '../../ui/notices';
@@ -166,7 +167,7 @@ class Queue {
       cell(progressOf(job)),
       cell(time),
       cell(h('span.faint', formatTime(job.created))),
-      cell(isFinal(job.state) ? '' : this.cancelButton(job)),
+      cell(isFinal(job.state) ? this.eraseButton(job) : this.cancelButton(job)),
     );
   }
 
@@ -186,6 +187,16 @@ class Queue {
       client.cancelJob(job.id).then(() => void this.refresh().catch(tellError), tellError);
     };
     return button('Cancel', cancel, { class: 'quiet', 'aria-label': `Cancel ${shortId(job.id)}` });
+  }
+
+  private eraseButton(job: Job): HTMLElement {
+    const erase = async (): Promise<void> => {
+      if (!(await eraseJob(job))) return;
+      if (this.chosen.has(job.id)) this.choose(job.id, false);
+      this.list.forget(job.id);
+      this.show();
+    };
+    return button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${shortId(job.id)}` });
   }
 
   private choose(id: string, isOn: boolean): void {

@@ -248,7 +248,7 @@ class Prepare {
   }
 
   private setSurfaceKind(kind: Kind): void {
-    this.parameters = withKind(this.parameters, kind);
+    this.parameters = withKind(this.parameters, kind, this.volume.spacing);
     this.showKind();
     this.changed();
   }

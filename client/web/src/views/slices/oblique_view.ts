@@ -3,6 +3,7 @@ import type { Axis, Vec3, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
 import { imageOf, paintImage } from '../../ui/pixels';
 import { Signal, type Scope } from '../../ui/signal';
+import { WheelSteps } from '../../ui/wheel';
 import { axisDirection, cross, opposite, pictureAxes, sampleAt, sideOf, toPatient, toSamples } from '../../volume/geometry';
 import { lineIn, obliqueFrame, through, type Angles } from '../../volume/oblique';
 import type { Preview } from '../../volume/preview';
@@ -214,9 +215,10 @@ export class ObliqueView {
       press = null;
     });
     scope.listen(canvas, 'pointercancel', () => (press = null));
+    const wheel = new WheelSteps();
     scope.listen(canvas, 'wheel', (event: WheelEvent) => {
       event.preventDefault();
-      this.step(-Math.sign(event.deltaY));
+      this.step(-wheel.steps(event));
     });
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
       const step = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 }[event.key];
@@ -227,6 +229,7 @@ export class ObliqueView {
   }
 
   private step(by: number): void {
+    if (by === 0) return;
     const { volume, cursor, setCursor } = this.host;
     const { normal } = obliqueFrame(this.angles);
     const length = by * Math.max(...volume.spacing);

@@ -3,6 +3,7 @@ import type { Axis, Vec3, Volume } from '../../api/types';
 import { h, uniqueId } from '../../ui/dom';
 import { imageOf, paintImage } from '../../ui/pixels';
 import type { Scope } from '../../ui/signal';
+import { WheelSteps } from '../../ui/wheel';
 import { contour } from '../../volume/contour';
 import type { LabelLook } from '../../volume/label_map';
 import { labelImage, labelOpacity } from '../labels/label_opacity';
@@ -117,7 +118,7 @@ export class SliceView {
       h('div.slice-picture', this.canvas, this.state, this.readout.element, this.zoom.element),
       h('figcaption', h('span.slice-title', titles[plane]), this.slider, this.place),
     ]);
-    this.loader = new SliceLoader(host.source, this.layout.normal, scope, {
+    this.loader = new SliceLoader(host.source, this.layout.normal, this.count(this.layout.normal), scope, {
       onChange: () => this.draw(),
       onRefused: (error) => host.onError(error),
     });
@@ -160,7 +161,7 @@ export class SliceView {
   }
 
   private step(by: number): void {
-    this.goTo(this.host.state().cursor[axisIndex(this.layout.normal)] + by);
+    if (by !== 0) this.goTo(this.host.state().cursor[axisIndex(this.layout.normal)] + by);
   }
 
   // The picture's place on the canvas, in canvas pixels.
@@ -360,10 +361,11 @@ export class SliceView {
 
   private listenToSteps(): void {
     const { canvas, scope } = this;
+    const wheel = new WheelSteps();
     scope.listen(canvas, 'wheel', (event: WheelEvent) => {
       event.preventDefault();
       if (event.ctrlKey || event.metaKey) this.zoom.wheel(event);
-      else if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
+      else this.step(wheel.steps(event));
     });
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
       const key = event.key;

@@ -1,6 +1,7 @@
 // Enlarges and moves a slice: by the wheel with Ctrl or a pinch, by dragging with Shift or the middle button, by keys.
 import { button } from '../../ui/dom';
 import type { Scope } from '../../ui/signal';
+import { wheelZoom } from '../../ui/wheel';
 import { Zoom } from '../../volume/zoom';
 
 const keyFactor = 1.25;
@@ -39,7 +40,7 @@ export class SliceZoom {
   }
 
   wheel(event: WheelEvent): void {
-    this.zoom.by(Math.exp(-Math.max(-60, Math.min(60, event.deltaY)) / 120), this.partOf(event));
+    this.zoom.by(wheelZoom(event), this.partOf(event));
     this.changed();
   }
 

@@ -195,6 +195,13 @@ export class SurfacePane {
     if (this.options.volume) this.surface?.setCross(this.options.volume, cursor);
   }
 
+  // Marks those places of the surface.
+  mark(places: readonly Vec3[]): void {
+    this.surface?.mark(places);
+    this.element.dataset.marks = String(places.length);
+    this.element.scrollIntoView({ block: 'nearest' });
+  }
+
   fit(): void {
     this.surface?.fit();
   }

@@ -4,9 +4,8 @@ import type { UploadedVolume, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
 import { formatDims } from '../../ui/format';
 import { hashOf } from '../../ui/route';
-import { skippedText } from '../../volume/names';
-import type { NamedFile } from '../../volume/tar';
-import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices } from './remedies';
+import { skippedText, volumeName } from '../../volume/names';
+import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices, type Source } from './remedies';
 
 // Either a volume or an error.
 export interface Outcome {
@@ -34,10 +33,10 @@ export function rejected(outcome: Outcome, choices: Choices, error: ApiError): O
   return { ...outcome, choices, error, asked: openQuestion(error, choices, outcome.asked) };
 }
 
-function storedRow({ id, dims }: Volume, name: string, wasThere: boolean): Node[] {
+function storedRow(volume: Volume, wasThere: boolean): Node[] {
   return [
-    h('a', { href: hashOf(['volumes', id]) }, name),
-    h('span.faint', `${formatDims(dims)}, ${wasThere ? 'already stored' : 'stored'}`),
+    h('a', { href: hashOf(['volumes', volume.id]) }, volumeName(volume)),
+    h('span.faint', `${formatDims(volume.dims)}, ${wasThere ? 'already stored' : 'stored'}`),
   ];
 }
 
@@ -45,29 +44,29 @@ function refusedRow(
   error: ApiError,
   name: string,
   { choices, asked }: Outcome,
-  files: readonly NamedFile[],
-  onAgain: (choices: Choices) => void,
+  source: Source,
+  onAgain: (...each: [Choices, ...Choices[]]) => void,
 ): (Node | false)[] {
   return [
     h('b', name),
     h('p', questionOf(error, choices) || error.detail || error.title),
     acceptButton(error, choices, onAgain),
-    ...choiceLists(asked, choices, files, onAgain),
+    ...choiceLists(asked, choices, source, onAgain),
   ];
 }
 
-// `onAgain` has a refused one read once more, with other choices. `files` are those of the upload.
+// `onAgain` has a refused one read once more, with other choices, or several times, with each of them.
 export function outcomeList(
   outcomes: readonly Outcome[],
-  files: readonly NamedFile[],
-  onAgain: (outcome: Outcome, choices: Choices) => void,
+  source: Source,
+  onAgain: (outcome: Outcome, ...each: [Choices, ...Choices[]]) => void,
 ): HTMLElement {
   const row = (outcome: Outcome): HTMLElement => {
     const { member, volume, wasThere, error } = outcome;
     const name = member === dicomMember ? 'DICOM files' : member;
     return h('li', { 'data-member': member, class: !error ? 'stored' : questionOf(error, outcome.choices) ? 'asked' : 'refused' }, [
-      ...(volume ? storedRow(volume, name, wasThere) : []),
-      ...(error ? refusedRow(error, name, outcome, files, (choices) => onAgain(outcome, choices)) : []),
+      ...(volume ? storedRow(volume, wasThere) : []),
+      ...(error ? refusedRow(error, name, outcome, source, (...each) => onAgain(outcome, ...each)) : []),
     ]);
   };
   const skipped = skippedText(outcomes.flatMap(({ volume }) => volume ?? []));

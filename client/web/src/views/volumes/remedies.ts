@@ -1,10 +1,11 @@
 // The options that a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../../api/problem';
-import type { Choice } from '../../api/types';
+import type { Choice, Volume } from '../../api/types';
 import { button, h, uniqueId } from '../../ui/dom';
+import { hashOf } from '../../ui/route';
 import { numbersOf } from '../../ui/numbers';
 import { grouped, peekAtSeries, type Peek } from '../../volume/dicom_peek';
-import type { NamedFile } from '../../volume/tar';
+import type { Gathered } from '../../volume/gather';
 import { paintPicture, timeChoice } from './time_choice';
 
 // The values of the query's parameters that choose or accept something.
@@ -41,6 +42,19 @@ export function questionOf(error: ApiError, before: Choices): string {
   return first === undefined || before[first] !== undefined ? '' : `Which ${nouns[first]}?`;
 }
 
+// The UIDs of the series that a question offers.
+export function seriesOf(asked: Asked | null): string[] {
+  return ((asked && choicesOf(asked.error).get('series')) ?? []).map(({ value }) => value);
+}
+
+// Those that are not read yet.
+export function unread(asked: Asked | null, stored: ReadonlyMap<string, Volume>): string[] {
+  return seriesOf(asked).filter((uid) => !stored.has(uid));
+}
+
+// The files of an upload, and the series of it that were read.
+export type Source = Pick<Gathered, 'files' | 'stored'>;
+
 interface Row {
   value: string;
   thumbnail: HTMLCanvasElement;
@@ -68,18 +82,32 @@ function tree(rows: readonly Row[], found: ReadonlyMap<string, Peek>): HTMLEleme
 function choiceList(
   parameter: Choice['parameter'],
   choices: readonly Choice[],
-  files: readonly NamedFile[],
+  { files, stored }: Source,
   answered: string,
-  onChoice: (value: string) => void,
+  onChoice: (...values: [string, ...string[]]) => void,
 ): HTMLElement {
+  const marked = new Set<string>();
+  const readMarked = button('', () => onChoice(...([...marked] as [string])), { class: 'primary', hidden: true });
+  const mark = (value: string, isOn: boolean): void => {
+    if (isOn) marked.add(value);
+    else marked.delete(value);
+    readMarked.hidden = marked.size === 0;
+    readMarked.textContent = `Read the ${marked.size} marked`;
+  };
   const rows = choices.map(({ value, title }) => {
     const thumbnail = h('canvas', { width: 1, height: 1, 'aria-hidden': 'true', hidden: parameter !== 'series' });
     const facts = h('span.faint');
     const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), facts);
-    return { value, thumbnail, facts, element: h('li', button(h('span.choice', thumbnail, text), () => onChoice(value))) };
+    const seen = h('span.choice', thumbnail, text);
+    const volume = stored.get(value);
+    const isOneOfSeveral = parameter === 'series' && !volume && choices.length > 1;
+    const box = isOneOfSeveral && h('input', { type: 'checkbox', 'aria-label': `Mark ${title}` });
+    if (box) box.addEventListener('change', () => mark(value, box.checked));
+    const element = volume ? h('li.stored', h('a', { href: hashOf(['volumes', volume.id]) }, seen), h('span.faint', 'stored')) : h('li', box, button(seen, () => onChoice(value)));
+    return { value, thumbnail, facts, element };
   });
   const own = parameter === 'spacing' && h('li', spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
-  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
+  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own, h('li', readMarked));
   if (parameter === 'series') {
     peekAtSeries(files.map(({ file }) => file), choices.map(({ value }) => value)).then(
       (found) => {
@@ -88,7 +116,7 @@ function choiceList(
           facts.textContent = peek?.date ?? '';
           if (peek?.picture) paintPicture(peek.picture, thumbnail);
         }
-        list.replaceChildren(...tree(rows, found));
+        list.replaceChildren(...tree(rows, found), h('li', readMarked));
       },
       // The browser cannot read the files any more. The titles are enough to choose.
       () => undefined,
@@ -137,15 +165,19 @@ function spacingForm(answered: string, onChoice: (value: string) => void): HTMLE
   return form;
 }
 
-// A list for each parameter that the rejection leaves to be chosen. `now` are the choices of the last attempt.
+// A list for each parameter that the rejection leaves to be chosen. `now` are the choices of the last attempt. Several series
+// may be chosen at once.
 export function choiceLists(
   asked: Asked | null,
   now: Choices,
-  files: readonly NamedFile[],
-  onChoices: (choices: Choices) => void,
+  source: Source,
+  onChoices: (...each: [Choices, ...Choices[]]) => void,
 ): HTMLElement[] {
   if (!asked) return [];
   return [...choicesOf(asked.error)].map(([parameter, choices]) =>
-    choiceList(parameter, choices, files, now[parameter] ?? '', (value) => onChoices({ ...asked.choices, [parameter]: value })),
+    choiceList(parameter, choices, source, now[parameter] ?? '', (...values) => {
+      const [first, ...others] = values.map((value) => ({ ...asked.choices, [parameter]: value }));
+      if (first) onChoices(first, ...others);
+    }),
   );
 }

@@ -13,7 +13,7 @@ import { faultOf } from '../../volume/sniff';
 import type { NamedFile } from '../../volume/tar';
 import { outcomeList, outcomeOf, rejected, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
-import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices } from './remedies';
+import { acceptButton, choiceLists, openQuestion, questionOf, seriesOf, unread, type Asked, type Choices } from './remedies';
 import { UploadProgress } from './upload_progress';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
@@ -26,6 +26,14 @@ interface Addition {
   asked?: Asked | null;
   // The results of the upload's volumes; `choices` names the one to retry.
   outcomes?: readonly Outcome[];
+  // Other choices with which the upload is read after this time.
+  next?: readonly Choices[];
+}
+
+// Series of an upload that nobody has chosen, which stay offered until a person says no.
+interface Rest {
+  gathered: Gathered;
+  asked: Asked;
 }
 
 const idle = '';
@@ -44,6 +52,7 @@ export class UploadPanel {
   // The last upload of one volume, for readAgain().
   private last: { id: string; gathered: Gathered; choices: Choices } | null = null;
   private waiting: Gathered[] = [];
+  private rests: Rest[] = [];
 
   constructor() {
     this.element = h('section.drop', { 'aria-label': 'Upload a volume' }, [
@@ -175,18 +184,47 @@ export class UploadPanel {
     if (next) void this.begin(next);
   }
 
-  private showUploaded(uploaded: UploadedVolume[], gathered: Gathered, { outcomes, choices = {} }: Addition): void {
+  private showUploaded(uploaded: UploadedVolume[], gathered: Gathered, addition: Addition): void {
+    const { outcomes, choices = {}, asked = null } = addition;
     const [first] = uploaded;
-    if (outcomes && first) {
+    const { series } = choices;
+    if (series !== undefined && first?.volume) gathered.stored.set(series, first.volume);
+    const [again, ...next] = addition.next ?? [];
+    if (again) {
+      void this.send(gathered, { ...addition, choices: again, next });
+    } else if (outcomes && first) {
       this.showOutcomes(withOutcome(outcomes, choices, { ...first, member: choices['member'] ?? '' }), gathered);
     } else if (uploaded.length > 1 || !first?.volume) {
       this.showOutcomes(uploaded.map((each) => outcomeOf(each, choices)), gathered);
     } else {
       this.last = { id: first.volume.id, gathered, choices };
+      this.keepRest(gathered, asked);
       this.showIdle();
-      this.tellOf(first);
-      this.goOn();
+      // Several are not opened.
+      if (addition.next) this.onStored?.();
+      else this.tellOf(first);
+      if (this.rests.length === 0) this.goOn();
     }
+  }
+
+  private keepRest(gathered: Gathered, asked: Asked | null): void {
+    this.rests = this.rests.filter((rest) => rest.gathered !== gathered);
+    if (asked && unread(asked, gathered.stored).length > 0) this.rests.push({ gathered, asked });
+  }
+
+  // What was not chosen is offered after each series that is read, until there is none or a person says no.
+  private showRest(rest: Rest): void {
+    const { gathered, asked } = rest;
+    const no = (): void => {
+      this.keepRest(gathered, null);
+      this.showIdle();
+      this.goOn();
+    };
+    this.body.replaceChildren(
+      h('div', { role: 'status' }, h('h2', moreSeries(rest)), h('p', gathered.name)),
+      ...choiceLists(asked, {}, gathered, (choices, ...next) => void this.send(gathered, { choices, asked, ...(next.length > 0 && { next }) })),
+      h('div.actions', button('No more of these', no)),
+    );
   }
 
   // Opens the volume if this panel is shown; elsewhere a note says that it was stored.
@@ -204,6 +242,8 @@ export class UploadPanel {
       tell(['This volume is already stored.', ...noteTexts(volume), skipped && `${skipped}.`].filter(Boolean).join(' '));
     }
     go(path);
+    const rest = this.rests.at(-1);
+    if (rest) tell(h('span', `${moreSeries(rest)}. `, h('a', { href: hashOf([]) }, 'Choose one')));
   }
 
   private showFailed(error: unknown, gathered: Gathered, addition: Addition): void {
@@ -225,6 +265,11 @@ export class UploadPanel {
   private showIdle(): void {
     this.element.classList.remove('busy');
     this.state.value = idle;
+    const rest = this.rests.at(-1);
+    if (rest) {
+      this.showRest(rest);
+      return;
+    }
     this.body.replaceChildren(
       icon(arrow),
       h('h2', 'Drop a volume here'),
@@ -251,10 +296,11 @@ export class UploadPanel {
     const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
     const known = before.choices ?? {};
     const asked = openQuestion(error, known, before.asked ?? null);
-    const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices, asked });
+    const sendWith = (choices: Choices, ...next: Choices[]): void =>
+      void this.send(gathered, { ...before, choices, asked, next: next.length > 0 ? next : undefined });
     const accept = acceptButton(error, known, sendWith);
     const question = questionOf(error, known);
-    const lists = choiceLists(asked, known, gathered.files, sendWith);
+    const lists = choiceLists(asked, known, gathered, sendWith);
     if (question !== '' && !accept) {
       this.showQuestion(question, gathered, lists);
       return;
@@ -288,15 +334,19 @@ export class UploadPanel {
   // The results of several volumes stay until the next upload, since each rejected one can be retried.
   private showOutcomes(outcomes: readonly Outcome[], gathered: Gathered): void {
     this.element.classList.remove('busy');
-    const stored = outcomes.filter(({ volume }) => volume !== null).length;
+    const stored = outcomes.filter(({ volume }) => volume !== null).length + gathered.stored.size;
+    const count = outcomes.reduce((sum, { asked }) => sum + Math.max(1, seriesOf(asked).length), 0);
     this.body.replaceChildren(
-      h('h2', { role: 'status' }, `${stored} of ${outcomes.length} volumes in the upload were stored`),
-      outcomeList(outcomes, gathered.files, (_, choices) => void this.send(gathered, { choices, outcomes })),
-      h('div.actions', button('Upload another', () => this.showIdle())),
+      h('h2', { role: 'status' }, `${stored} of ${count} volumes in the upload were stored`),
+      outcomeList(outcomes, gathered, ({ asked }, choices, ...next) => void this.send(gathered, { choices, asked, outcomes, next })),
+      h('div.actions', button('Upload another', () => {
+        this.showIdle();
+        this.goOn();
+      })),
     );
     this.reveal();
     this.onStored?.();
-    if (outcomes.every(({ volume }) => volume !== null)) this.goOn();
+    if (stored === count) this.goOn();
   }
 
   private showUnusable(error: ApiError): void {
@@ -324,8 +374,18 @@ function isPanelShown(): boolean {
   return isVolumeList(currentRoute());
 }
 
+function moreSeries({ asked, gathered: { stored } }: Rest): string {
+  const left = unread(asked, stored).length;
+  return left === 1 ? '1 more series is in this upload' : `${left} more series are in this upload`;
+}
+
 function withOutcome(outcomes: readonly Outcome[], choices: Choices, uploaded: UploadedVolume): Outcome[] {
-  return outcomes.map((each) => (each.member === uploaded.member ? outcomeOf(uploaded, choices, each.asked) : each));
+  const after = (before: Outcome): Outcome => {
+    // The other series are still offered.
+    if (before.asked && choices['series'] !== undefined) return { ...before, ...before.asked };
+    return outcomeOf(uploaded, choices, before.asked);
+  };
+  return outcomes.map((each) => (each.member === uploaded.member ? after(each) : each));
 }
 
 export const uploads = new UploadPanel();

@@ -3,7 +3,7 @@ import introPicture from '../../intro.webp';
 import { client } from '../../client';
 import type { Job, Volume } from '../../api/types';
 import { inWords, surfaceInWords } from '../../job/parameters';
-import { button, h } from '../../ui/dom';
+import { button, checkbox, h } from '../../ui/dom';
 import { formatBytes, formatCount, formatSpacing, formatTime } from '../../ui/format';
 import { ask, askText, tell, tellError } from '../../ui/notices';
 import { hashOf } from '../../ui/route';
@@ -39,35 +39,47 @@ async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal:
   canvas.dataset.painted = '';
 }
 
+// Only what comes into sight is fetched.
+function whenSeen(element: HTMLElement, scope: Scope, run: () => void): void {
+  const seen = new IntersectionObserver((entries) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    seen.disconnect();
+    run();
+  });
+  seen.observe(element);
+  scope.onEnd(() => seen.disconnect());
+}
+
+// Lists leave the patient out.
+async function namePatient(volume: Volume, title: HTMLElement): Promise<void> {
+  const { dicom } = await client.getVolume(volume.id);
+  title.textContent = title.title = volumeName({ ...volume, dicom });
+}
+
 function thumbnail(volume: Volume, scope: Scope): HTMLElement {
   const canvas = h('canvas.thumbnail', {
     width: thumbnailPixels,
     height: thumbnailPixels,
     'aria-hidden': 'true',
   });
-  // Only what comes into sight is fetched.
-  const seen = new IntersectionObserver((entries) => {
-    if (!entries.some((entry) => entry.isIntersecting)) return;
-    seen.disconnect();
-    // A card without its picture still says everything.
-    paintThumbnail(canvas, volume, scope.signal).catch(() => canvas.classList.add('blank'));
-  });
-  seen.observe(canvas);
-  scope.onEnd(() => seen.disconnect());
+  // A card without its picture still says everything.
+  whenSeen(canvas, scope, () => void paintThumbnail(canvas, volume, scope.signal).catch(() => canvas.classList.add('blank')));
   return canvas;
 }
 
 function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChanged: () => void): HTMLElement {
   const erase = async (): Promise<void> => {
+    let isWithJobs = false;
     const sure = await ask(
       'Erase this volume?',
-      `${volumeName(volume)} and its samples will be removed from the server. The surfaces made from it stay.`,
+      `${volumeName(volume)} and its samples will be removed from the server.`,
       'Erase',
+      checkbox('Also erase the surfaces that were made from it', false, (isOn) => (isWithJobs = isOn)),
     );
     if (!sure) return;
     try {
-      await client.eraseVolume(volume.id);
-      tell('The volume was erased.');
+      await client.eraseVolume(volume.id, isWithJobs ? { jobs: 'erase' } : {});
+      tell(isWithJobs ? 'The volume and its surfaces were erased.' : 'The volume was erased.');
       onErased();
     } catch (error) {
       tellError(error);
@@ -85,11 +97,14 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
   };
   const name = volumeName(volume);
   const kind = volumeKind(volume);
+  const title = h('strong', { title: name }, name);
+  // A card without its patient is still a card.
+  if (volume.format === 'dicom') whenSeen(title, scope, () => void namePatient(volume, title).catch(() => undefined));
   return h('li.card', { 'data-volume': volume.id }, [
     h('a.card-link', { href: hashOf(['volumes', volume.id]) }, [
       thumbnail(volume, scope),
       h('span.card-text', [
-        h('strong', { title: name }, name),
+        title,
         h('span', name === kind ? volume.type : kind),
         h('span', formatSpacing(volume.spacing)),
         h('span.faint', `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),

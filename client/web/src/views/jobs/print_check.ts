@@ -1,0 +1,69 @@
+// What to know before a surface is printed, in plain words, and what helps where it is not ready.
+import type { Job, Vec3 } from '../../api/types';
+import { isForPrinter } from '../../job/printing';
+import { isByLabels } from '../../job/table';
+import { makeVariant } from '../../job/variants';
+import { button, h, type Child } from '../../ui/dom';
+import { formatBytes, formatCount, formatNumber, formatSize, meshFormatTitle, millimetres } from '../../ui/format';
+
+// A point tells, and neither passes nor fails.
+type State = 'good' | 'bad' | 'told';
+
+const marks: Record<State, readonly [string, string]> = { good: ['\u2713', 'Good: '], bad: ['\u2717', 'Not ready: '], told: ['\u2022', ''] };
+
+function point(state: State, ...text: Child[]): HTMLElement {
+  const [mark, words] = marks[state];
+  return h('li', { 'data-state': state }, [h('span.mark', { 'aria-hidden': 'true' }, mark), h('span', h('span.sr-only', words), ...text)]);
+}
+
+// Null for a surface that was not made for a printer. `show` goes to places on the surface and marks them.
+export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): HTMLElement | null {
+  const { mesh, parameters } = job;
+  if (!mesh || mesh.empty || !isForPrinter(parameters)) return null;
+  const make = makeVariant(job);
+  const remedy = (text: string, title: string, ...[changes]: Parameters<typeof make>): HTMLElement =>
+    button(text, () => make(changes), { class: 'link', title });
+  const { closed, self_intersections: crossings } = mesh.quality;
+  const { certificate, components } = mesh;
+
+  const points = [
+    closed
+      ? point('good', 'Closed: it has an inside.')
+      : point('bad', `Open at ${formatCount(mesh.boundary_edges)} edges. `, !parameters.close && remedy('Close it', 'Starts a job that closes the surface', { close: true })),
+  ];
+  if (components === 1) points.push(point('good', 'One connected component.'));
+  else if (isByLabels(parameters)) points.push(point('told', `${formatCount(components)} connected components, of all labels.`));
+  else {
+    const keep = remedy('Keep the largest', 'Starts a job that drops all other components', { components: { ...parameters.components, keep: 1 } });
+    points.push(point('bad', `${formatCount(components)} connected components, which fall apart. `, keep));
+  }
+  if (crossings && crossings.pairs > 0) {
+    const places = crossings.places as Vec3[];
+    const pairs = crossings.pairs === 1 ? '1 pair of triangles crosses. ' : `${formatCount(crossings.pairs)} pairs of triangles cross. `;
+    const isAsExtracted = parameters.passes === 0 && !parameters.regularize;
+    const extracted = { passes: 0, regularize: false, max_error_mm: null, triangles: null };
+    points.push(
+      point('bad', pairs, 'Programs for printers often repair this. ', places.length > 0 && button('Show them', () => show(places), { class: 'link', title: 'Marks them on the surface' }), ' ',
+        !isAsExtracted && remedy('Make it without smoothing', 'Starts a job with the triangles as they are extracted, which do not cross, and many more of them', extracted)),
+    );
+  } else if (crossings) points.push(point('good', 'No triangle crosses another one.'));
+  if (certificate) {
+    const { bound_mm: bound, found_mm: found } = certificate;
+    points.push(
+      typeof bound === 'number'
+        ? point('good', `Nowhere more than ${millimetres(bound)} mm from the scan. This is proven.`)
+        : point('told', `Up to ${millimetres(found)} mm from the scan, as measured at points. This is not proven.`),
+    );
+  }
+  const [low, high] = mesh.bounds;
+  const size = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');
+  const material = mesh.quality.encloses_volume ? `, ${formatNumber(mesh.volume_mm3.smoothed / 1000, 2)} cm\u00b3 if it is filled` : '';
+  points.push(point('told', `${size} mm${material}.`));
+  const files = ['stl', '3mf'].flatMap((format) => {
+    const file = mesh.files[format as 'stl'];
+    return file ? [`${meshFormatTitle(format as 'stl')} ${formatBytes(file.bytes)}`] : [];
+  });
+  points.push(point('told', `${files.join(', ')}; ${formatCount(mesh.triangles)} triangles.`));
+  points.push(point('told', 'Thin walls are not measured. Look for walls below the width of your nozzle in the program of your printer.'));
+  return h('ul.print-check', ...points);
+}
