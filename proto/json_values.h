@@ -104,6 +104,9 @@ void write(Json& place, const T& value) {
   } else {
     make_object(place);
     visit(value, [&](const auto& name, const auto& member) { write_field(place, name, member); });
+    if constexpr (std::is_base_of_v<MeshParameters, T>) {
+      if (!value.preset.empty()) write_field(place, rows::kIso, value.preset);
+    }
   }
 }
 
@@ -195,6 +198,11 @@ void read_members(const Json& json, T& value) {
       throw Error(ErrorCode::kInternal, std::string("lacks ") + key);
     }
   });
+  if constexpr (std::is_base_of_v<MeshParameters, T>) {
+    const Json* const iso = find(json, rows::kIso.name);
+    const bool is_word = iso != nullptr && is_string(*iso);
+    value.preset = is_word && text(*iso) != rows::kIso.when_empty ? text(*iso) : "";
+  }
 }
 
 template <class T>

@@ -45,6 +45,7 @@ struct Parameter {
   std::optional<double> above = {};
   std::optional<double> maximum = {};
   const char* when_empty = nullptr;  // the word for no value, instead of JSON's null
+  bool takes_presets = false;        // their names, instead of a number
   Meanings values = {};              // of an enumeration's values, in order
   SmoothingCases cases = {};
   bool is_required = false;

@@ -115,9 +115,15 @@ constinit const Parameter kSpeed = {
 constinit const Parameter kIso = {
     .name = "iso",
     .title = "Iso-value",
-    .help = "The iso-value in the volume's units, or `otsu` for Otsu's threshold.",
-    .more = "A sample is inside when its value is >= iso.",
+    .help =
+        "The iso-value in the volume's units, `otsu` for Otsu's threshold, or the name of one of "
+        "the volume's presets.",
+    .more =
+        "A sample is inside when its value is >= iso. A CT in Hounsfield units has `skin`, "
+        "`soft-tissue` and `bone`, a fractional segmentation has `segment`, if the value occurs "
+        "in it. The job then has the preset's number.",
     .when_empty = "otsu",
+    .takes_presets = true,
     .is_required = true,
     .unless = "labels",
     .jobs = JobKind::kAtIso,

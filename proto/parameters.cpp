@@ -6,8 +6,10 @@
 #include <iterator>
 #include <string_view>
 
+#include "base/text.h"
 #include "proto/json.h"
 #include "proto/json_tree.h"
+#include "proto/presets.h"
 
 namespace isomesh {
 namespace {
@@ -105,9 +107,18 @@ std::string must_be(const Parameter& parameter, bool is_whole) {
                            : parameter.maximum ? "number"
                                                : "finite number";
   const std::string range = range_of(parameter);
-  const std::string word =
-      parameter.when_empty == nullptr ? "" : " or \"" + std::string(parameter.when_empty) + '"';
-  return "must be a " + kind + (range.empty() ? "" : ' ' + range) + word;
+  std::vector<std::string> all = {"must be a " + kind + (range.empty() ? "" : ' ' + range)};
+  if (parameter.when_empty != nullptr) all.push_back(in_quotes(parameter.when_empty));
+  for (const std::string& name : presets_of(parameter)) all.push_back(in_quotes(name));
+  return listed(all);
+}
+
+std::vector<std::string> presets_of(const Parameter& parameter) {
+  std::vector<std::string> names;
+  for (const PresetRow& row : kPresets) {
+    if (parameter.takes_presets) names.push_back(name_in_requests(row));
+  }
+  return names;
 }
 
 std::string number_text(double number) {

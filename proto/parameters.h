@@ -75,6 +75,9 @@ struct Callback {
 // and jobs with equal parameters share their result. parameters.h has the meanings and ranges.
 struct MeshParameters {
   std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
+  // Of a request: the preset (presets.h) whose value the server puts into `iso`, which is empty
+  // until then. Empty in jobs.
+  std::string preset = {};
   SchemeName scheme = SchemeName::kSix;
   Interpolation interpolation = Interpolation::kLinear;
   bool regularize = true;
@@ -255,6 +258,9 @@ std::string option_name_of(const Parameter& parameter);
 // The range of a number in words: "from 0 to 1000", "above 0 and at most 1", "of at least 0";
 // empty if every number is allowed.
 std::string range_of(const Parameter& parameter);
+
+// The presets that the parameter takes in place of a number.
+std::vector<std::string> presets_of(const Parameter& parameter);
 
 // "must be a whole number from 0 to 1000": the requirement that a rejected number failed.
 std::string must_be(const Parameter& parameter, bool is_whole);

@@ -1,9 +1,11 @@
-// The iso-values that have a name: the importer gives them to the volumes that have them, the
-// command takes their names.
+// The iso-values that have a name: the importer gives them to the volumes that have them, and
+// requests for jobs take their names.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace isomesh {
@@ -19,5 +21,13 @@ struct PresetRow {
 // contrast agent and calcified tissue.
 inline constexpr std::array kPresets = {PresetRow{"skin", -300}, PresetRow{"soft tissue", -25},
                                         PresetRow{"bone", 250}, PresetRow{"segment", {}}};
+
+// Requests write "soft-tissue".
+inline std::string name_in_requests(std::string_view preset) {
+  std::string name(preset);
+  std::ranges::replace(name, ' ', '-');
+  return name;
+}
+inline std::string name_in_requests(const PresetRow& row) { return name_in_requests(row.name); }
 
 }  // namespace isomesh

@@ -265,13 +265,26 @@ void complete(const Json& json, JobParameters& parameters, RequestReader& reader
   }
 }
 
+// The name of a preset, which otsu takes the place of; empty if there is none.
+std::string taken_preset(Json& json) {
+  const auto iso = json.find(rows::kIso.name);
+  if (iso == json.end() || !iso->is_string()) return {};
+  const std::vector<std::string> names = presets_of(rows::kIso);
+  std::string name = iso->get<std::string>();
+  if (std::ranges::find(names, name) == names.end()) return {};
+  *iso = rows::kIso.when_empty;
+  return name;
+}
+
 JobParameters defaults_of(const Json& json) {
   return json.contains("labels") ? label_parameters({}) : JobParameters{};
 }
 
-JobParameters read_parameters(const Json& json, bool with_volume, RequestReader& reader) {
+JobParameters read_parameters(Json json, bool with_volume, RequestReader& reader) {
   JobParameters parameters = defaults_of(json);
+  const std::string preset = taken_preset(json);
   reader.read_object(json, parameters, "");
+  parameters.preset = preset;
   visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter,
                                const auto& member) {
     const bool is_expected = parameter.is_required && (with_volume || path != "volume") &&

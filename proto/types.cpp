@@ -32,6 +32,11 @@ struct Names<SampleType> {
 };
 
 template <>
+struct Names<SaidModality> {
+  static constexpr std::array kTable = {std::pair{SaidModality::kCt, "ct"}};
+};
+
+template <>
 struct Names<NiftiForm> {
   static constexpr std::array kTable = {std::pair{NiftiForm::kSform, "sform"},
                                         std::pair{NiftiForm::kQform, "qform"}};
@@ -175,6 +180,7 @@ std::string names_of() {
   template std::string names_of<Enum>();
 
 ISOMESH_NAMED(SampleType)
+ISOMESH_NAMED(SaidModality)
 ISOMESH_NAMED(NiftiForm)
 ISOMESH_NAMED(SchemeName)
 ISOMESH_NAMED(Interpolation)

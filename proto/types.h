@@ -136,6 +136,9 @@ struct DicomIdentity {
   bool operator==(const DicomIdentity&) const = default;
 };
 
+// The modalities that an upload may say of a file that has none: samples are Hounsfield units.
+enum class SaidModality { kCt };
+
 // The two transformations of a NIfTI header.
 enum class NiftiForm { kSform, kQform };
 
@@ -266,6 +269,7 @@ struct JobEvent {
 
 // The API's names of the values.
 std::string_view to_string(SampleType value);
+std::string_view to_string(SaidModality value);
 std::string_view to_string(NiftiForm value);
 std::string_view to_string(SchemeName value);
 std::string_view to_string(Interpolation value);

@@ -49,9 +49,6 @@ int upload(Client& client, const Options& options, const std::stop_token& stop) 
 JobParameters parameters_of(const Options& options, Client& client) {
   JobParameters parameters = options.parameters;
   parameters.volume = volume_id(client, options.id);
-  if (!options.preset.empty()) {
-    parameters.iso = preset_of(client.volume(parameters.volume), options.preset);
-  }
   return parameters;
 }
 

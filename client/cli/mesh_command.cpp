@@ -230,7 +230,6 @@ int MeshRun::mesh(const Volume& volume, const Task& task) {
   JobParameters parameters = options_.parameters;
   parameters.volume = volume.id;
   if (!outputs.empty()) parameters.formats = formats_of(outputs);
-  if (!options_.preset.empty()) parameters.iso = preset_of(volume, options_.preset);
   if (options_.dry_run) return dry_run(parameters, task);
 
   const std::optional<Job> job = made(parameters);

@@ -49,14 +49,9 @@ enum class Formats { kAsOption, kByFiles };
 // How the parameters are sent: a query carries only those with `in_query`.
 enum class Carrier { kBody, kQuery };
 
-// Adds an option for each parameter, which sets its member of `parameters`. The name of a preset,
-// given instead of an iso-value, goes to `preset`.
-void add_parameters(CLI::App& app, JobParameters& parameters, std::string& preset, Formats formats,
+// Adds an option for each parameter, which sets its member of `parameters`.
+void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats,
                     Carrier carrier = Carrier::kBody);
-
-// The iso-value of a volume's preset, such as "bone". Throws Error kInvalidParameter, which lists
-// the presets, if there is none with that name.
-double preset_of(const Volume& volume, const std::string& name);
 
 // The error's text with the options' names instead of the fields': "--max-error" for
 // "max_error_mm".

@@ -119,7 +119,7 @@ class Parser {
 
     CLI::App& submit = command(Command::kSubmit, "submit", "Start a job and print its id");
     add_id(submit, options_, "VOLUME");
-    add_parameters(submit, options_.parameters, options_.preset, Formats::kAsOption);
+    add_parameters(submit, options_.parameters, Formats::kAsOption);
     submit
         .add_option("--key", options_.key,
                     "Idempotency key: the same key returns the same job (default: a new key)")
@@ -128,8 +128,7 @@ class Parser {
     CLI::App& estimate =
         command(Command::kEstimate, "estimate", "Estimate the size, memory and time of a job");
     add_id(estimate, options_, "VOLUME");
-    add_parameters(estimate, options_.parameters, options_.preset, Formats::kAsOption,
-                   Carrier::kQuery);
+    add_parameters(estimate, options_.parameters, Formats::kAsOption, Carrier::kQuery);
 
     add_id(command(Command::kStatus, "status", "Show a job"), options_, "JOB");
     CLI::App& wait = command(Command::kWait, "wait", "Wait until a job ends, then show it");
@@ -321,7 +320,7 @@ class Parser {
     add_allow_empty(app, options_, kWriteEmpty);
     // Help tells this default; choose_glb_codec applies it.
     const GlbCodec usual = std::exchange(options_.parameters.glb_codec, kSavedGlbCodec);
-    add_parameters(app, options_.parameters, options_.preset, Formats::kByFiles);
+    add_parameters(app, options_.parameters, Formats::kByFiles);
     options_.parameters.glb_codec = usual;
     add_raw(app, options_);
   }
@@ -398,7 +397,6 @@ class Parser {
     if (!is_job) return;
     JobParameters parameters = options_.parameters;
     parameters.volume = "any";
-    if (!options_.preset.empty()) parameters.iso = 0;
     if (!options_.outputs.empty()) parameters.formats = formats_of(options_.outputs);
     const std::string url = parameters.callback ? lower(parameters.callback->url) : "http://";
     if (!url.starts_with("http://") && !url.starts_with("https://")) {

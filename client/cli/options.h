@@ -56,7 +56,6 @@ struct Options {
   UploadOptions upload;                      // mesh, upload; without progress
   std::string id;                            // of a job, a volume and so on; may be shortened
   JobParameters parameters;                  // mesh, submit, estimate
-  std::string preset;                        // the iso-value's name; empty: see parameters
   bool dry_run = false;                      // mesh: only an estimate
   bool skip_existing = false;                // mesh: not if its outputs are newer than the input
   int jobs = 1;                              // mesh: inputs processed concurrently

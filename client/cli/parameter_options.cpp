@@ -14,18 +14,9 @@
 #include "client/cli/option_values.h"
 #include "client/cli/text.h"
 #include "proto/parameters.h"
-#include "proto/presets.h"
 
 namespace isomesh::cli {
 namespace {
-
-// "Soft tissue" and "soft-tissue" are "soft tissue".
-std::string folded(const std::string& name) {
-  std::string text = lower(name);
-  std::ranges::replace(text, '-', ' ');
-  std::ranges::replace(text, '_', ' ');
-  return text;
-}
 
 // The default in words, or one for each kind of smoothing; empty if there is none.
 template <class T>
@@ -134,30 +125,18 @@ class ParameterOptions {
                                                               std::optional<Number>& value) {
     if (parameter.when_empty == nullptr) return add_plain<Number>(name, parameter, help, value);
     const std::string word = parameter.when_empty;
-    const bool is_iso = std::string_view(parameter) == "iso";
-    std::vector<std::string> words = {word};
-    for (const PresetRow& row : kPresets) {
-      if (is_iso) words.emplace_back(row.name);
-    }
-    std::vector<std::string> shown = words;
-    std::string type = "N";
-    for (std::string& each : shown) {
-      std::ranges::replace(each, ' ', '-');
-      type += '|' + each;
-    }
-    const std::string more = is_iso ? ". A CT also has the presets skin, soft-tissue and bone; a "
-                                      "fractional segmentation has segment"
-                                    : "";
-    return isomesh::cli::add(app_, name, type, help + more,
-                             [this, &value, name, word, words, shown](const std::string& text) {
+    const std::vector<std::string> presets = presets_of(parameter);
+    std::string type = "N|" + word;
+    for (const std::string& each : presets) type += '|' + each;
+    return isomesh::cli::add(app_, name, type, help,
+                             [this, &value, name, word, presets,
+                              wanted = must_be(parameter, false)](const std::string& text) {
                                value = number_from<Number>(text);
                                preset_.clear();
-                               const std::string plain = folded(text);
-                               if (value || plain == word) return;
-                               if (std::ranges::find(words, plain) == words.end()) {
-                                 refuse(name, "must be a number, " + listed(shown));
-                               }
-                               preset_ = plain;
+                               if (value || lower(text) == word) return;
+                               preset_ = lower(text);
+                               if (std::ranges::find(presets, preset_) == presets.end())
+                                 refuse(name, wanted);
                              });
   }
 
@@ -337,10 +316,9 @@ std::string with_option_names(std::string text) {
 
 }  // namespace
 
-void add_parameters(CLI::App& app, JobParameters& parameters, std::string& preset, Formats formats,
-                    Carrier carrier) {
+void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats, Carrier carrier) {
   // The options' callbacks use it as long as the command's table exists.
-  const auto kept = std::make_shared<ParameterOptions>(app, preset);
+  const auto kept = std::make_shared<ParameterOptions>(app, parameters.preset);
   ParameterOptions& all = *kept;
   std::map<std::string, CLI::Option*> options;  // by the parameters' names
   std::vector<Parameter> added;
@@ -369,20 +347,6 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
     if (is_left_out("passes")) parameters.passes = standard.passes;
     if (is_left_out("smoothing")) parameters.smoothing = standard.smoothing;
   });
-}
-
-double preset_of(const Volume& volume, const std::string& name) {
-  std::vector<std::string> names;
-  for (const Preset& preset : volume.presets) {
-    if (folded(preset.name) == folded(name)) return preset.iso;
-    names.push_back('"' + preset.name + '"');
-  }
-  const std::string has = names.empty()
-                              ? "it has none. Only CTs in Hounsfield units and fractional "
-                                "segmentations have presets, and only for values that occur in them"
-                              : "it has " + listed(names);
-  throw Error(ErrorCode::kInvalidParameter,
-              "--iso: the volume has no preset \"" + name + "\"; " + has);
 }
 
 std::string in_options(const Error& error) {

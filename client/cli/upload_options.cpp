@@ -58,6 +58,11 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
                       "Use the sform or the qform of a NIfTI header for the geometry",
                       [&](NiftiForm form) { options.upload.nifti_form = form; })
       ->group(kUploadGroup);
+  add_name<SaidModality>(
+      app, "--modality",
+      "The file does not say so, but it is a CT in Hounsfield units: gives it presets for --iso",
+      [&](SaidModality modality) { options.upload.modality = modality; })
+      ->group(kUploadGroup);
   add(app, "--name", "TEXT", "Name of the volume (default: the name of the series or the file)",
       [&](const std::string& text) { options.upload.name = text; })
       ->group(kUploadGroup);

@@ -68,6 +68,8 @@ struct UploadOptions {
   // Codes of notes whose errors to override, as listed in the server's error.
   std::vector<std::string> accept = {};
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
+  // Of a file that tells none: says that the samples are Hounsfield units.
+  std::optional<SaidModality> modality = {};
   // Millimetres along x, y and z, for a file that gives none, or instead of those in `raw`.
   std::optional<std::array<double, 3>> spacing = {};
   std::string name = {};  // of the volume; empty: that of the file or folder

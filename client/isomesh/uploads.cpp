@@ -51,6 +51,7 @@ std::string upload_query(const UploadOptions& options) {
   for (const std::string& code : options.accept) accepted += (accepted.empty() ? "" : ",") + code;
   if (!accepted.empty()) pairs.emplace_back("accept", accepted);
   if (options.nifti_form) pairs.emplace_back("nifti_form", to_string(*options.nifti_form));
+  if (options.modality) pairs.emplace_back("modality", to_string(*options.modality));
   if (options.spacing && !options.raw) pairs.emplace_back("spacing", joined(*options.spacing));
   return pairs.empty() ? std::string() : query_string(pairs);
 }

@@ -205,6 +205,7 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
     yaml.under("oneOf", [&] {
       yaml.line("- type: number");
       yaml.line(std::string("- const: ") + parameter.when_empty);
+      for (const std::string& name : presets_of(parameter)) yaml.line("- const: " + name);
     });
   } else {
     yaml.line("type: " + type_of<T>());

@@ -13,6 +13,7 @@
 #include "server/import/other_formats.h"
 #include "server/import/peers/series.h"
 #include "server/import/readers.h"
+#include "server/import/source/ct_presets.h"
 #include "server/import/source/gzip.h"
 
 namespace isomesh::import {
@@ -44,9 +45,20 @@ std::string beginning_of(const InputFile& file) {
                   "type.");
 }
 
-}  // namespace
+// Adds what the uploader says of the samples.
+void add_modality(SaidModality modality, Volume& volume) {
+  if (volume.format == "dicom") {
+    throw invalid_parameter("modality",
+                            "applies to files that do not tell their modality; DICOM does");
+  }
+  switch (modality) {
+    case SaidModality::kCt:
+      volume.modality = "CT";
+      add_ct_presets(volume);
+  }
+}
 
-Volume import_volume(const ImportTask& task, const FormatListener& listener) {
+Volume read_volume(const ImportTask& task, const FormatListener& listener) {
   const Input input = {.path = task.source, .companions = {}, .task = task, .listener = listener};
   if (task.options.raw) return read_raw_input(input);
   if (task.options.peers) return read_peers_series(task, listener);
@@ -58,6 +70,14 @@ Volume import_volume(const ImportTask& task, const FormatListener& listener) {
                             "selects a member of an archive, but this file is not an archive");
   }
   return read_input(*reader, input);
+}
+
+}  // namespace
+
+Volume import_volume(const ImportTask& task, const FormatListener& listener) {
+  Volume volume = read_volume(task, listener);
+  if (task.options.modality) add_modality(*task.options.modality, volume);
+  return volume;
 }
 
 }  // namespace isomesh::import

@@ -101,6 +101,52 @@ TEST_F(JobsTest, APreferredWaitThatIsNoNumberIsRefused) {
   EXPECT_EQ(daemon_.get(path, {{"Prefer", "respond-async, wait=1; x=y"}}).status, 200);
 }
 
+// Three samples of air, fat and bone along each axis.
+RawUpload said_ct() {
+  std::vector<std::int16_t> samples(27, -1000);
+  samples[13] = 1200;
+  samples[14] = -50;
+  return {.bytes = bytes_of(samples), .query = "dims=3,3,3&type=int16&modality=ct", .options = {}};
+}
+
+TEST_F(JobsTest, AnIsoValueMayBeNamed) {
+  const RawUpload ct = said_ct();
+  const Volume volume = upload(daemon_, ct);
+  EXPECT_EQ(volume.modality, "CT");
+  EXPECT_EQ(volume.presets.size(), 3U);
+  for (const auto& [name, iso] :
+       std::map<std::string, double>{{"skin", -300}, {"soft-tissue", -25}, {"bone", 250}}) {
+    const Answer answer =
+        daemon_.send("POST", "/v1/jobs?wait=30",
+                     R"({"volume": ")" + volume.id + R"(", "iso": ")" + name + "\"}");
+    ASSERT_EQ(answer.status, 200) << answer.body;
+    EXPECT_EQ(job_from_json(answer.body).parameters.iso, iso);
+    EXPECT_EQ(
+        estimate_from_json(daemon_.get("/v1/estimate?volume=" + volume.id + "&iso=" + name).body)
+            .iso,
+        iso);
+  }
+  const Answer mesh = daemon_.send("POST", "/v1/mesh?iso=bone&" + ct.query, ct.bytes);
+  ASSERT_EQ(mesh.status, 200) << mesh.body;
+  EXPECT_EQ(job_from_json(daemon_.get(mesh.header("location")).body).parameters.iso, 250);
+}
+
+TEST_F(JobsTest, ANameThatTheVolumeDoesNotHaveIsRefusedWithThoseThatItHas) {
+  const Volume ct = upload(daemon_, said_ct());
+  const auto ask = [&](const Volume& volume, const std::string& name) {
+    return post(R"({"volume": ")" + volume.id + R"(", "iso": ")" + name + "\"}");
+  };
+  const Answer of_ct = ask(ct, "segment");
+  EXPECT_TRUE(blames(of_ct, "iso"));
+  EXPECT_THAT(of_ct.body, testing::HasSubstr(R"(it has \"skin\", \"soft-tissue\" or \"bone\")"));
+  const Answer of_another = ask(volume_, "bone");
+  EXPECT_TRUE(blames(of_another, "iso"));
+  EXPECT_THAT(of_another.body, testing::HasSubstr("it has none"));
+  const Answer unknown = ask(ct, "teeth");
+  EXPECT_TRUE(blames(unknown, "iso"));
+  EXPECT_THAT(unknown.body, testing::HasSubstr("soft-tissue"));
+}
+
 TEST_F(JobsTest, AWaitEndsWhenItsTimeIsOver) {
   const Job job = long_job(daemon_);
   const Job seen = job_from_json(daemon_.get("/v1/jobs/" + job.id + "?wait=0.05").body);

@@ -237,6 +237,9 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   parameters.volume = *record.order.volume;
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;
+  if (!parameters.preset.empty()) {
+    jobs::resolve_preset(parameters, services_.volumes.get(viewer, parameters.volume));
+  }
   if (parameters.labels) {
     const Volume volume = services_.volumes.get(viewer, parameters.volume);
     parameters = jobs::complete_labels(std::move(parameters), viewer, volume, services_.labels);

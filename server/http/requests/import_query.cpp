@@ -95,6 +95,12 @@ NiftiForm nifti_form_of(std::string_view text) {
   return *form;
 }
 
+SaidModality modality_of(std::string_view text) {
+  const auto modality = from_string<SaidModality>(text);
+  if (!modality) throw invalid_parameter("modality", "must be " + names_of<SaidModality>());
+  return *modality;
+}
+
 void refuse_choice_in_raw(const Request& request) {
   for (const std::string& name : file_parameters()) {
     if (request.has_parameter(name)) {
@@ -122,6 +128,7 @@ const std::set<std::string>& import_parameters() {
   static const std::set<std::string> names = [] {
     std::set<std::string> all = raw_parameters();
     all.insert(file_parameters().begin(), file_parameters().end());
+    all.insert("modality");
     return all;
   }();
   return names;
@@ -129,13 +136,14 @@ const std::set<std::string>& import_parameters() {
 
 ImportOptions import_options_of(const Request& request) {
   ImportOptions options{.raw = raw_description_of(request)};
+  const auto take = [&](const char* name, auto read, auto& option) {
+    if (request.has_parameter(name)) option = read(request.parameter(name));
+  };
+  take("modality", modality_of, options.modality);
   if (options.raw) {
     refuse_choice_in_raw(request);
     return options;
   }
-  const auto take = [&](const char* name, auto read, auto& option) {
-    if (request.has_parameter(name)) option = read(request.parameter(name));
-  };
   take("series", series_of, options.series);
   take("member", member_of, options.member);
   take("volume", volume_of, options.volume);

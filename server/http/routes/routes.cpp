@@ -94,10 +94,11 @@ std::string json_body(App& app, const Request& request) {
 
 JobParameters complete_parameters(const App& app, const Request& request,
                                   JobParameters parameters) {
-  if (!parameters.labels && !parameters.crop) return parameters;
+  if (!parameters.labels && !parameters.crop && parameters.preset.empty()) return parameters;
   const store::Viewer viewer = viewer_of(request);
   const Volume volume = app.services.volumes.get(viewer, parameters.volume);
   if (parameters.crop) jobs::samples_in(*parameters.crop, volume.geometry, volume.dims);
+  jobs::resolve_preset(parameters, volume);
   if (!parameters.labels) return parameters;
   return jobs::complete_labels(std::move(parameters), viewer, volume, app.services.labels);
 }

@@ -85,8 +85,8 @@ net::FairPlaces::Place place_for_upload(App& app, const Request& request);
 // the places for uploads. Throws as place_for_upload and read_text do.
 std::string json_body(App& app, const Request& request);
 
-// Completes the parameters from their volume; see jobs::complete_labels. Throws as that does, and
-// Error kNotFound without the volume.
+// Completes the parameters from their volume; see jobs::resolve_preset and jobs::complete_labels.
+// Throws as these do, and Error kNotFound without the volume.
 JobParameters complete_parameters(const App& app, const Request& request, JobParameters parameters);
 
 // Submits a job. Throws as store::job_of does.

@@ -23,6 +23,7 @@
 #include "server/import/labels/closed_ends.h"
 #include "server/import/samples/padding.h"
 #include "server/import/samples/transfer.h"
+#include "server/import/source/ct_presets.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import {
@@ -199,23 +200,24 @@ Volume describe_volume(const Stack& stack) {
   return volume;
 }
 
-bool is_in_hounsfield_units(const Image& image) {
-  return image.modality == "CT" && (image.rescale_type.empty() || image.rescale_type == "HU");
+// Some files lack the rescale that every CT must have, and have the numbers of the detector.
+bool is_in_hounsfield_units(const Stack& stack, const Volume& volume) {
+  const Image& image = *stack.slices.front().image;
+  if (image.modality != "CT") return false;
+  if (!image.rescale_type.empty()) return image.rescale_type == "HU";
+  return stack.slices.front().frame->has_intercept || volume.range[0] < 0;
 }
 
 // Adds the presets whose values occur. They may be better than a value derived from the samples.
 void suggest(const Stack& stack, Volume& volume) {
-  const bool is_ct = is_in_hounsfield_units(*stack.slices.front().image);
-  const bool is_fractional = are_labels(stack) && are_shares(stack);
-  if (is_fractional) volume.suggested_iso = half_of(stack);
-  for (const PresetRow& row : kPresets) {
-    if (row.hounsfield ? !is_ct : !is_fractional) continue;
-    const double iso = row.hounsfield ? *row.hounsfield : half_of(stack);
-    // Half of a share is inside of a part that was cut out, too.
-    if (row.hounsfield && iso <= volume.range[0]) continue;
-    if (iso > volume.range[1]) continue;
-    volume.presets.push_back({std::string(row.name), iso});
-  }
+  if (is_in_hounsfield_units(stack, volume)) add_ct_presets(volume);
+  if (!are_labels(stack) || !are_shares(stack)) return;
+  volume.suggested_iso = half_of(stack);
+  // Half of a share is inside of a part that was cut out, too.
+  if (volume.suggested_iso > volume.range[1]) return;
+  const auto* const row =
+      std::ranges::find(kPresets, std::optional<double>(), &PresetRow::hounsfield);
+  volume.presets.push_back({std::string(row->name), volume.suggested_iso});
 }
 
 // Notes of one code are one note.

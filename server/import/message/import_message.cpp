@@ -21,6 +21,7 @@ void visit(Is<ImportOptions> auto& self, auto&& field) {
   field("member", self.member);
   field("accept", self.accept);
   field("nifti_form", self.nifti_form);
+  field("modality", self.modality);
   field("spacing", self.spacing);
   field("peers", self.peers);
 }

@@ -39,7 +39,8 @@ struct ImportOptions {
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
   // Millimetres along x, y and z, for a file that gives none.
   std::optional<std::array<double, 3>> spacing = {};
-  std::optional<PeersSeries> peers = {};  // empty: a client's upload
+  std::optional<SaidModality> modality = {};  // empty: what the file says
+  std::optional<PeersSeries> peers = {};      // empty: a client's upload
 
   bool accepts(NoteCode code) const {
     return std::ranges::find(accept, describe(code).name) != accept.end();

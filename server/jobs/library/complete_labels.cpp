@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "base/text.h"
+#include "proto/presets.h"
 #include "server/mesh/labels/label_voxels.h"
 #include "server/mesh/smooth/methods.h"
 #include "server/volume/names.h"
@@ -17,6 +19,25 @@ void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t,
 }
 
 }  // namespace
+
+void resolve_preset(MeshParameters& parameters, const Volume& volume) {
+  if (parameters.preset.empty()) return;
+  std::vector<std::string> names;
+  for (const Preset& preset : volume.presets) {
+    names.push_back(in_quotes(name_in_requests(preset.name)));
+    if (name_in_requests(preset.name) == parameters.preset) parameters.iso = preset.iso;
+  }
+  if (!parameters.iso) {
+    throw invalid_parameter(
+        rows::kIso.name,
+        "the volume has no preset " + in_quotes(parameters.preset) + "; it has " +
+            (names.empty() ? "none. Only CTs in Hounsfield units and fractional segmentations have "
+                             "presets, and only for values that occur in them. For a CT whose file "
+                             "does not say so, upload it with modality=ct"
+                           : listed(names)));
+  }
+  parameters.preset.clear();
+}
 
 JobParameters complete_labels(JobParameters parameters, const store::Viewer& viewer,
                               const Volume& volume, LabelLists& lists) {

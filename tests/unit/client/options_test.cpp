@@ -61,9 +61,10 @@ TEST_F(OptionsTest, ReadsRawSamples) {
 }
 
 TEST_F(OptionsTest, AnIsoValueMayBeAPreset) {
-  EXPECT_EQ(options_from({"submit", "abc", "--iso", "bone"}).preset, "bone");
-  EXPECT_EQ(options_from({"submit", "abc", "--iso", "Soft-Tissue"}).preset, "soft tissue");
-  EXPECT_EQ(options_from({"submit", "abc", "--iso", "250"}).preset, "");
+  EXPECT_EQ(options_from({"submit", "abc", "--iso", "bone"}).parameters.preset, "bone");
+  EXPECT_EQ(options_from({"submit", "abc", "--iso", "Soft-Tissue"}).parameters.preset,
+            "soft-tissue");
+  EXPECT_EQ(options_from({"submit", "abc", "--iso", "250"}).parameters.preset, "");
   EXPECT_EQ(end_of({"submit", "abc", "--iso", "bones"}).first, kWrongUsage);
 }
 

@@ -58,9 +58,10 @@ TEST(RawDescription, PartsOfItWithoutDimsAreRefused) {
 }
 
 TEST(ImportParameters, AreAllThatAreRead) {
-  EXPECT_THAT(import_parameters(),
-              UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order",
-                                   "series", "member", "volume", "accept", "nifti_form"));
+  EXPECT_THAT(
+      import_parameters(),
+      UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order", "series",
+                           "member", "volume", "accept", "nifti_form", "modality"));
 }
 
 TEST(ImportOptionsOf, TakesASeries) {
@@ -114,6 +115,13 @@ TEST(ImportOptionsOf, TakesTheSpacingOfAFileThatHasNone) {
   EXPECT_FALSE(import_options_of(with_query({})).spacing);
 }
 
+TEST(ImportOptionsOf, TakesTheModalityOfAnyFile) {
+  EXPECT_EQ(import_options_of(with_query({{"modality", "ct"}})).modality, SaidModality::kCt);
+  const Pairs raw = {{"dims", "3,4,5"}, {"type", "int16"}, {"modality", "ct"}};
+  EXPECT_EQ(import_options_of(with_query(raw)).modality, SaidModality::kCt);
+  EXPECT_FALSE(import_options_of(with_query({})).modality);
+}
+
 TEST(ImportOptionsOf, RefusesOtherValues) {
   for (const auto& pair : Pairs{{"member", ""},
                                 {"member", "a\nb"},
@@ -127,6 +135,7 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
                                 {"spacing", "1,1"},
                                 {"spacing", "1,1,0"},
                                 {"spacing", "1,1,nan"},
+                                {"modality", "mr"},
                                 {"nifti_form", "both"}}) {
     const Error error =
         error_of([&] { import_options_of(with_query({pair})); }, pair.first + '=' + pair.second);

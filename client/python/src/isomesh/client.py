@@ -83,6 +83,7 @@ class Client:
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
+        modality: str = "",
         progress: Optional[Progress] = None,
         # `generate` writes these lines: the parameters of a job.
         iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
@@ -105,7 +106,7 @@ class Client:
         source    everything that `upload` takes, or a stored volume: its id or its dict
         progress  a function that is called with the job about once a second
 
-        `affine` to `nifti_form` are as for `upload`. All other keywords are parameters of the job;
+        `affine` to `modality` are as for `upload`. All other keywords are parameters of the job;
         `help(isomesh.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
         besides `.ply`.
 
@@ -155,6 +156,7 @@ class Client:
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
+        modality: str = "",
     ) -> api.Volume:
         """Stores a volume and returns the server's description of it. The same upload
         gets the same id.
@@ -168,6 +170,8 @@ class Client:
                   samples along each axis. An array with neither has 1 mm, as raw samples have
         raw       for a path or bytes: describes them as raw samples
         name      the volume's name. Default: the name of the file or of its series
+        modality  "ct" says that the samples are Hounsfield units, if the file does not say so. The volume
+                  then has the presets of a CT, such as iso="bone"
 
         `series`, `member` and `volume` select one volume of several, `accept` and `nifti_form` settle
         what a file leaves open. An error names the one that helps. If the upload has several volumes,
@@ -179,12 +183,13 @@ class Client:
         return self._upload_one(source, False, {name: keywords[name] for name in (*_UPLOAD_KEYWORDS, "affine_space")})
 
     def upload_all(
-        self, source: Source, *, name: str = "", accept: Sequence[str] = (), nifti_form: str = ""
+        self, source: Source, *, name: str = "", accept: Sequence[str] = (), nifti_form: str = "", modality: str = ""
     ) -> List[api.UploadedVolumesVolumes]:
         """Stores every volume of a file, folder or archive. Each item of the result has the `volume`,
         or the `problem` for which the server rejected it."""
         body = uploads.of_source(source, None, "ras", None, None)
-        uploaded = self._exchange.upload(body, name, {"accept": ",".join(accept), "nifti_form": nifti_form})
+        chosen = {"accept": ",".join(accept), "nifti_form": nifti_form, "modality": modality}
+        uploaded = self._exchange.upload(body, name, chosen)
         for each in uploaded:
             if each["volume"]:
                 warn_of_notes(each["volume"]["notes"], each["member"] or body.name)
@@ -408,6 +413,7 @@ class Client:
             "volume": "" if number is None else str(int(number)),
             "accept": ",".join(get("accept", ())),
             "nifti_form": get("nifti_form", ""),
+            "modality": get("modality", ""),
         }
         body = uploads.of_source(source, get("affine"), get("affine_space", "ras"), get("spacing"), get("raw"))
         uploaded = self._exchange.upload(body, get("name", ""), chosen)
@@ -471,7 +477,7 @@ class _Arriving:
         self._file.write(head)
 
 
-_UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form")
+_UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form", "modality")
 
 
 def _is_empty(keyword: str, value: Any) -> bool:

@@ -278,9 +278,16 @@ TEST(DicomPresets, AreThoseOfACtInHounsfieldUnits) {
 
 TEST(DicomPresets, LieWithinTheSamples) {
   const DicomSeries series;  // 0 to 4095
-  const Outcome outcome = import_objects(series.files());
+  const Outcome outcome = import_scaled(series, {{"1", "0"}});
   ASSERT_EQ(outcome.volume.presets.size(), 1);
   EXPECT_EQ(outcome.volume.presets[0].name, "bone");
+}
+
+TEST(DicomPresets, AreNotOfACtWithoutARescale) {
+  const DicomSeries series;  // 0 to 4095
+  const Outcome outcome = import_objects(series.files());
+  EXPECT_EQ(outcome.volume.modality, "CT");
+  EXPECT_TRUE(outcome.volume.presets.empty());
 }
 
 TEST(DicomIdentityImport, IsKeptInUtf8) {
