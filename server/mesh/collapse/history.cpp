@@ -80,7 +80,7 @@ void History::visit_triangles(std::uint32_t vertex, Visit visit) {
   while (!stack_.empty()) {
     const std::uint32_t v = stack_.back();
     stack_.pop_back();
-    for (std::uint32_t n = begins_[v]; n < begins_[v + 1]; ++n) visit(triangles_[n]);
+    for (std::size_t n = begins_[v]; n < begins_[v + 1]; ++n) visit(triangles_[n]);
     for (std::uint32_t child = child_[v]; child != kNone; child = sibling_[child]) {
       stack_.push_back(child);
     }

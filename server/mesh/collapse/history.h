@@ -19,7 +19,7 @@ struct Collapse {
   std::uint32_t step = 0;  // more than that of each collapse before that changed a triangle of it
 };
 
-// Takes 4 bytes a triangle, and 20 more from the first undo on.
+// Takes 4 bytes a triangle, and some 20 more from the first undo on.
 class History {
  public:
   explicit History(std::size_t vertices = 0);
@@ -48,9 +48,10 @@ class History {
   template <class Visit>
   void visit_triangles(std::uint32_t vertex, Visit visit);
 
-  std::vector<std::uint32_t> into_, step_;         // of each vertex that is gone
-  std::vector<std::uint32_t> begins_, triangles_;  // by vertex: the original triangles
-  std::vector<std::uint32_t> child_, sibling_;     // vertices that were drawn into a vertex
+  std::vector<std::uint32_t> into_, step_;      // of each vertex that is gone
+  std::vector<std::size_t> begins_;             // by vertex: of its original triangles
+  std::vector<std::uint32_t> triangles_;        // of one vertex after the other
+  std::vector<std::uint32_t> child_, sibling_;  // vertices that were drawn into a vertex
   std::vector<std::uint8_t> is_undone_;
   std::vector<std::uint32_t> undone_, stack_;
 };
