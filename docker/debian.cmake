@@ -16,6 +16,14 @@ foreach(pair daemon:isomeshd client:isomesh dev:libisomesh-dev)
   string(TOUPPER ${component} upper)
   set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package})
 endforeach()
+# For administrators. The folders are those of the sources, so links in the texts stay right.
+set(doc ${CMAKE_INSTALL_DATADIR}/doc/isomeshd)
+file(GLOB texts CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/docs/*.md)
+install(FILES ${texts} DESTINATION ${doc}/docs COMPONENT daemon)
+install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/SECURITY.md DESTINATION ${doc} COMPONENT daemon)
+foreach(file hospital.toml nginx.conf upstream.conf alerts.yml dashboard.json)
+  install(FILES ${PROJECT_SOURCE_DIR}/docker/${file} DESTINATION ${doc}/docker COMPONENT daemon)
+endforeach()
 
 include(${PROJECT_SOURCE_DIR}/server/install/sbom.cmake)
 

@@ -18,6 +18,7 @@
 #include "client/cli/report.h"
 #include "client/cli/uploads.h"
 #include "client/isomesh/client.h"
+#include "client/isomesh/file.h"
 #include "proto/json.h"
 
 namespace isomesh::cli {
@@ -118,12 +119,36 @@ int fetch(Client& client, const Options& options) {
   return kDone;
 }
 
-// Deletes as many volumes as possible and reports the others.
+void erase_job(Client& client, const std::string& id) {
+  if (client.erase_job(job_id(client, id))) {
+    throw Error(ErrorCode::kNotReady,
+                "the job had not ended. It is cancelled now; repeat the "
+                "command to delete it");
+  }
+}
+
+int report(Client& client, const Options& options) {
+  const std::string text = client.report(job_id(client, options.id)) + '\n';
+  if (options.report.empty() || options.report == "-") {
+    std::cout << text;
+  } else {
+    PartFile file(options.report);
+    file.write(text);
+    file.publish();
+  }
+  return kDone;
+}
+
+// Deletes as many of them as possible and reports the others.
 int erase(Client& client, const Options& options) {
   int status = kDone;
   for (const std::string& id : options.ids) {
     try {
-      client.erase_volume(volume_id(client, id));
+      if (options.are_jobs) {
+        erase_job(client, id);
+      } else {
+        client.erase_volume(volume_id(client, id), options.with_jobs);
+      }
     } catch (const Error& error) {
       complain(error, id);
       status = std::max(status, status_of(error));
@@ -157,7 +182,9 @@ int list(Client& client, const Options& options) {
     const auto volumes = client.volumes();
     std::cout << (options.json ? to_json(volumes) + '\n' : volume_list(volumes));
   } else {
-    const JobPage page = client.jobs(options.state, options.cursor);
+    JobFilter filter = options.filter;
+    if (!filter.volume.empty()) filter.volume = volume_id(client, filter.volume);
+    const JobPage page = client.jobs(filter, options.cursor);
     std::cout << (options.json ? to_json(page.jobs, page.next) + '\n'
                                : job_list(page.jobs, names_of_volumes(client, page.jobs)));
     if (!options.json && !page.next.empty()) {
@@ -227,13 +254,19 @@ struct CommandRow {
   int (*run)(Client& client, const Options& options);
 };
 
-constexpr std::array kCommands = {
-    CommandRow{Command::kEstimate, estimate}, CommandRow{Command::kSubmit, submit},
-    CommandRow{Command::kStatus, status},     CommandRow{Command::kWait, wait},
-    CommandRow{Command::kFetch, fetch},       CommandRow{Command::kCancel, cancel},
-    CommandRow{Command::kRename, rename},     CommandRow{Command::kErase, erase},
-    CommandRow{Command::kList, list},         CommandRow{Command::kInfo, info},
-    CommandRow{Command::kLabels, labels},     CommandRow{Command::kIds, ids}};
+constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
+                                  CommandRow{Command::kSubmit, submit},
+                                  CommandRow{Command::kStatus, status},
+                                  CommandRow{Command::kWait, wait},
+                                  CommandRow{Command::kFetch, fetch},
+                                  CommandRow{Command::kCancel, cancel},
+                                  CommandRow{Command::kRename, rename},
+                                  CommandRow{Command::kErase, erase},
+                                  CommandRow{Command::kList, list},
+                                  CommandRow{Command::kInfo, info},
+                                  CommandRow{Command::kLabels, labels},
+                                  CommandRow{Command::kReport, report},
+                                  CommandRow{Command::kIds, ids}};
 
 int dispatch(const Options& options, const std::stop_token& stop) {
   if (options.command == Command::kMesh) return mesh(options, stop);

@@ -59,14 +59,20 @@ constexpr std::array kExamples = {
     Examples{"cancel", R"(
   isomesh cancel 0192e4b1-77c3
 )"},
+    Examples{"report", R"(
+  isomesh report 0192e4b1-77c3 -o report.json
+)"},
     Examples{"rename", R"(
   isomesh rename 3f2a91c0 "CT of the knee"
 )"},
     Examples{"erase", R"(
   isomesh erase 3f2a91c0 77b01d2e
+  isomesh erase --with-jobs 3f2a91c0
+  isomesh erase --jobs 0192e4b1-77c3
 )"},
     Examples{"list", R"(
   isomesh list --state running
+  isomesh list --volume 3f2a91c0 --since 2026-11-20
   isomesh list --volumes
 )"},
     Examples{"info", R"(

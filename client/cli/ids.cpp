@@ -39,7 +39,7 @@ std::vector<Candidate> jobs_of(Client& client, bool is_first_page) {
   std::vector<Candidate> all;
   std::string cursor;
   do {
-    const JobPage page = client.jobs(std::nullopt, cursor);
+    const JobPage page = client.jobs({}, cursor);
     for (const Job& job : page.jobs) {
       all.push_back({job.id, std::string(to_string(job.state)) + "  " + job.created});
     }

@@ -144,21 +144,42 @@ class Parser {
                              [&](std::int64_t label) { options_.label = label; });
     add_allow_empty(fetch, options_, kWriteEmpty);
 
+    CLI::App& report = command(Command::kReport, "report",
+                               "Print what a finished job made, of what and how, as JSON to keep");
+    add_id(report, options_, "JOB");
+    report.add_option("-o,--output", options_.report, "File to write instead of standard output")
+        ->type_name("FILE");
+
     add_id(command(Command::kCancel, "cancel", "Cancel a job"), options_, "JOB");
 
     CLI::App& rename = command(Command::kRename, "rename", "Rename a volume");
     add_id(rename, options_, "VOLUME");
     rename.add_option("NAME", options_.name, "The new name; \"\" removes the name")->required();
 
-    command(Command::kErase, "erase", "Delete volumes from the server")
+    CLI::App& erase =
+        command(Command::kErase, "erase", "Delete volumes, or jobs and their meshes, for good");
+    erase
         .add_option("VOLUME", options_.ids,
                     "Ids of the volumes; unique beginnings or ends are enough")
         ->type_name("ID")
         ->required();
+    CLI::Option* const with_jobs =
+        erase.add_flag("--with-jobs", options_.with_jobs,
+                       "Also delete the ended jobs on these volumes, with their meshes");
+    erase.add_flag("--jobs", options_.are_jobs, "The ids are of ended jobs instead")
+        ->excludes(with_jobs);
 
     CLI::App& list = command(Command::kList, "list", "List jobs, or volumes");
     add_name<JobState>(list, "--state", "Only jobs in this state",
-                       [&](JobState state) { options_.state = state; });
+                       [&](JobState state) { options_.filter.state = state; });
+    list.add_option("--volume", options_.filter.volume, "Only jobs on this volume")
+        ->type_name("ID");
+    list.add_option("--since", options_.filter.since,
+                    "Only jobs submitted since this day, or time in UTC such as "
+                    "2026-11-20T07:30:00Z")
+        ->type_name("DATE");
+    list.add_option("--until", options_.filter.until, "Only jobs submitted before it")
+        ->type_name("DATE");
     list.add_option("--cursor", options_.cursor,
                     "Cursor of the page to show; the previous page prints it")
         ->type_name("CURSOR");

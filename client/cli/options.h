@@ -27,6 +27,7 @@ enum class Command {
   kList,
   kInfo,
   kLabels,
+  kReport,
   kIds,
   kAdded,
 };
@@ -63,11 +64,14 @@ struct Options {
   std::filesystem::path daemon;              // its program; empty: searched for
   std::string key;                           // submit
   std::vector<Output> outputs;               // mesh, fetch
-  std::optional<JobState> state;             // list
+  std::filesystem::path report;              // report: the file to write; empty: standard output
+  JobFilter filter;                          // list
   std::string cursor;                        // list
   bool volumes = false;                      // list
   std::string name;                          // rename
   std::vector<std::string> ids;              // erase
+  bool are_jobs = false;                     // erase: `ids` are of jobs
+  bool with_jobs = false;                    // erase: also the ended jobs on the volumes
   std::optional<std::int64_t> label;         // fetch
   std::int64_t background = 0;               // labels
   std::string kind;                          // ids: volumes, jobs, or an added kind

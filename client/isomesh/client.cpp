@@ -11,6 +11,7 @@
 #include "client/isomesh/file.h"
 #include "client/isomesh/impl.h"
 #include "proto/json.h"
+#include "proto/json_tree.h"
 
 namespace isomesh {
 namespace {
@@ -19,6 +20,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 // A job's JSON has a few kilobytes, so a longer line is not an event.
+constexpr int kNoContent = 204;
 constexpr std::size_t kLongestLine = 1024 * 1024;
 
 // Parses a job's stream of server-sent events incrementally. Not thread safe.
@@ -235,9 +237,10 @@ Volume Client::rename_volume(const std::string& id, const std::optional<std::str
                                        .body = volume_name_to_json(name)}));
 }
 
-void Client::erase_volume(const std::string& id) {
-  constexpr int kNoContent = 204;
-  const HttpResponse response = impl_->exchange({.method = "DELETE", .target = volume_path(id)});
+void Client::erase_volume(const std::string& id, bool with_jobs) {
+  const std::string query = with_jobs ? query_string({{"jobs", "erase"}}) : "";
+  const HttpResponse response =
+      impl_->exchange({.method = "DELETE", .target = volume_path(id) + query});
   if (response.status != kNoContent) throw other_api();
 }
 
@@ -303,16 +306,26 @@ Job Client::job(const std::string& id, seconds wait) {
   return job_from_json(impl_->repeat({.target = job_path(id) + query, .patience = wait}));
 }
 
-JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
+JobPage Client::jobs(const JobFilter& filter, const std::string& cursor) {
   Query query;
-  if (state) query.emplace_back("state", to_string(*state));
+  if (filter.state) query.emplace_back("state", to_string(*filter.state));
+  if (!filter.volume.empty()) query.emplace_back("volume", filter.volume);
+  if (!filter.since.empty()) query.emplace_back("since", filter.since);
+  if (!filter.until.empty()) query.emplace_back("until", filter.until);
   if (!cursor.empty()) query.emplace_back("cursor", cursor);
   const std::string body = impl_->repeat({.target = "/v1/jobs" + query_string(query)});
   return {.jobs = jobs_from_json(body), .next = next_from_json(body)};
 }
 
 Job Client::cancel(const std::string& id) {
-  return job_from_json(impl_->send({.method = "DELETE", .target = job_path(id)}));
+  const std::string query = query_string({{"erase", "false"}});
+  return job_from_json(impl_->send({.method = "DELETE", .target = job_path(id) + query}));
+}
+
+std::optional<Job> Client::erase_job(const std::string& id) {
+  const HttpResponse response = impl_->exchange({.method = "DELETE", .target = job_path(id)});
+  if (response.status == kNoContent) return std::nullopt;
+  return job_from_json(response.body);
 }
 
 Job Client::wait(const std::string& id, const JobProgress& progress) {
@@ -343,6 +356,12 @@ Job Client::follow(const std::string& id, const JobListener& listener) {
 
 std::vector<LabelSummary> Client::job_labels(const std::string& id) {
   return impl_->all_pages(job_path(id) + "/labels", labels_from_json);
+}
+
+std::string Client::report(const std::string& id) {
+  std::string body = impl_->repeat({.target = job_path(id) + "/report"});
+  if (!json_values::is_object(JsonTree(body).root())) throw other_api();
+  return body;
 }
 
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,

@@ -98,6 +98,15 @@ using JobListener = std::function<void(const JobEvent& event)>;
 // have. Follows links.
 std::filesystem::path materials_beside(const std::filesystem::path& obj);
 
+// Which jobs a list has; all if it is empty.
+struct JobFilter {
+  std::optional<JobState> state = {};
+  std::string volume = {};  // id
+  // Submitted since then, and before then: "2026-11-20" or "2026-11-20T07:30:00Z".
+  std::string since = {};
+  std::string until = {};
+};
+
 struct JobPage {
   std::vector<Job> jobs;
   std::string next;  // the cursor of the next page; empty on the last
@@ -149,7 +158,8 @@ class Client {
   std::vector<Volume> volumes();
   // Renames the volume, or removes its name.
   Volume rename_volume(const std::string& id, const std::optional<std::string>& name);
-  void erase_volume(const std::string& id);
+  // Also erases the ended jobs on the volume if `with_jobs` is true.
+  void erase_volume(const std::string& id, bool with_jobs = false);
   Histogram histogram(const std::string& id, std::uint32_t bins = 256);
   // The labels of the samples, except the background. Throws kUnusableVolume if samples are not
   // whole numbers.
@@ -168,10 +178,12 @@ class Client {
   // The job when it has ended, or its state after `wait` (whole seconds, limited to 30 by the
   // server).
   Job job(const std::string& id, std::chrono::seconds wait);
-  // A page of the jobs, in one state if given: the first, or the one of `cursor`.
-  JobPage jobs(std::optional<JobState> state = std::nullopt, const std::string& cursor = {});
+  // A page of the jobs that match, newest first: the first page, or the one of `cursor`.
+  JobPage jobs(const JobFilter& filter = {}, const std::string& cursor = {});
   // Returns the job. One that had ended keeps its state, and one that runs takes a moment to stop.
   Job cancel(const std::string& id);
+  // Erases an ended job and its files, and returns nothing; cancels any other and returns it.
+  std::optional<Job> erase_job(const std::string& id);
 
   // Returns the job in its final state. With a callback the job is polled at least once a second,
   // and the callback also gets the final state.
@@ -183,6 +195,10 @@ class Client {
   // The labels of a finished job, ascending, also if the job has only `labels_count`. Throws
   // kNotReady, the job's own error or kCancelled as fetch() does.
   std::vector<LabelSummary> job_labels(const std::string& id);
+
+  // What a finished job made, of what and how, as JSON. Throws kNotReady, the job's own error or
+  // kCancelled as fetch() does.
+  std::string report(const std::string& id);
 
   // Writes the mesh of a finished job to `target`, which appears only when complete and with the
   // SHA-256 that the job states. Resumes after a broken connection. Throws kNotReady if the job has

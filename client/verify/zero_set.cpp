@@ -51,8 +51,9 @@ class March {
   // The points on the edges of plane k, which the samples at their lower ends own.
   std::vector<std::array<std::uint32_t, 8>>& points(std::int64_t k) { return points_[k & 1]; }
   void forget(std::int64_t k) {
-    points(k).assign(static_cast<std::size_t>(field_.dims[0] * field_.dims[1]),
-                     {kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex});
+    points(k).assign(
+        static_cast<std::size_t>(field_.dims[0] * field_.dims[1]),
+        {kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex, kNoVertex});
   }
 
   std::size_t in_plane(unsigned c) const {

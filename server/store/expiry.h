@@ -4,9 +4,11 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,10 @@ struct Expired {
   std::uint64_t bytes = 0;              // of the blobs that no record names any more
   std::vector<std::string> blobs = {};  // keys of those blobs
 };
+
+// Called with the keys of the blobs that the records to be erased name, before they are gone. A
+// repeated transaction calls it again. May be empty.
+using BlobsGoing = std::function<void(std::span<const std::string> keys)>;
 
 // As `enough` of expire(): removes all given records.
 inline constexpr std::uint64_t kAllBytes = std::numeric_limits<std::uint64_t>::max();

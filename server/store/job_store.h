@@ -80,6 +80,14 @@ struct Outcome {
   Timing timing;  // with a mesh; otherwise the job keeps the progress of its last renewal
 };
 
+// Which jobs a list has; all if it is empty.
+struct JobFilter {
+  std::optional<JobState> state = {};
+  std::optional<std::string> volume = {};
+  std::optional<Time> since = {};  // submitted then or later
+  std::optional<Time> until = {};  // submitted before
+};
+
 // Data about a job for the service itself.
 struct JobAccount {
   Job job;
@@ -203,14 +211,19 @@ class JobStore {
   // it is. Throws Error kNotFound or kGone.
   virtual Job cancel(const Viewer& viewer, const std::string& id) = 0;
 
+  // Erases an ended job, its events and its undelivered callback. Its id is then kNotFound. Returns
+  // false, and changes nothing, if the job is queued or running. Throws Error kNotFound or kGone.
+  virtual bool erase(const Viewer& viewer, const std::string& id, const BlobsGoing& going = {}) = 0;
+
   // Throws Error kNotFound or kGone.
   virtual Job get(const Viewer& viewer, const std::string& id) const = 0;
 
   // For any owner. Throws Error kNotFound or kGone.
   virtual JobAccount account(const std::string& id) const = 0;
 
-  // Newest first; at most `limit` jobs older than the job `after` (empty: from the newest).
-  virtual std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
+  // Those that match, newest first; at most `limit` jobs older than the job `after` (empty: from
+  // the newest).
+  virtual std::vector<Job> list(const Viewer& viewer, const JobFilter& filter,
                                 const std::string& after, std::size_t limit) const = 0;
 
   // Events after `since` of one job, or of all if `job` is empty; oldest first, at most a few

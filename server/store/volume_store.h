@@ -18,6 +18,9 @@ namespace isomesh::store {
 // Order of a list, by the time of storing.
 enum class ListOrder { kOldestFirst, kNewestFirst };
 
+// What becomes of the jobs on an erased volume.
+enum class Made { kKept, kErased };
+
 // Records by owner and id. The same samples may belong to several records, of one owner or several,
 // which share one blob. A record is added after its blob and erased before it, so it never names a
 // missing blob. Thread safe; all methods may throw Error kOutOfSpace or kInternal.
@@ -55,9 +58,11 @@ class VolumeStore {
                                    std::size_t limit = std::numeric_limits<std::size_t>::max(),
                                    ListOrder order = ListOrder::kOldestFirst) const = 0;
 
-  // Erases every record of that id visible to the viewer. Throws Error kNotFound; kGone; kNotReady
-  // while a queued or running job of one of their owners needs the volume.
-  virtual void erase(const Viewer& viewer, const std::string& id) = 0;
+  // Erases every record of that id visible to the viewer and, if `made` says so, all ended jobs
+  // of their owners on the volume, as JobStore::erase does. Throws Error kNotFound; kGone;
+  // kNotReady while a queued or running job of one of their owners needs the volume.
+  virtual void erase(const Viewer& viewer, const std::string& id, Made made = Made::kKept,
+                     const BlobsGoing& going = {}) = 0;
 
   // True if any record, of a volume, mesh, order or received instance, names the blob.
   virtual bool names(const std::string& blob) const = 0;

@@ -123,68 +123,93 @@ std::string_view to_string(Axis axis) {
   return axis == Axis::kX ? "x" : axis == Axis::kY ? "y" : "z";
 }
 
+SliceSamples::SliceSamples(std::shared_ptr<const CanonicalFile> volume, Axis axis,
+                           std::uint32_t index)
+    : volume_(std::move(volume)), axis_(axis), index_(index) {
+  const Plane plane = plane_of(axis);
+  width_ = header().dims[plane.column];
+  height_ = header().dims[plane.row];
+  row_.resize(row_bytes());
+}
+
+std::array<double, 2> SliceSamples::spacing() const {
+  const Plane plane = plane_of(axis_);
+  const auto& spacing = header().geometry.spacing;
+  return {spacing[plane.column], spacing[plane.row]};
+}
+
+std::span<const std::byte> SliceSamples::row(std::uint32_t row) {
+  const Plane plane = plane_of(axis_);
+  const auto& dims = header().dims;
+  const std::array<std::uint64_t, 3> stride = {1, dims[0], std::uint64_t{dims[0]} * dims[1]};
+  const std::uint64_t first = index_ * stride[plane.fixed] + std::uint64_t{row} * stride[plane.row];
+  const std::uint64_t step = stride[plane.column];
+  const std::size_t size = bytes_per_sample(header().type);
+  if (step == 1) {
+    volume_->read(first * size, row_);
+    return row_;
+  }
+  const std::uint64_t step_bytes = step * size;
+  const std::uint64_t together = step_bytes > kCloseBytes ? 1 : kReadBytes / step_bytes;
+  for (std::uint64_t begin = 0; begin < width_; begin += together) {
+    const std::uint64_t count = std::min<std::uint64_t>(together, width_ - begin);
+    block_.resize((count - 1) * step_bytes + size);
+    volume_->read((first + begin * step) * size, block_);
+    for (std::uint64_t n = 0; n < count; ++n) {
+      std::memcpy(&row_[(begin + n) * size], &block_[n * step_bytes], size);
+    }
+  }
+  return row_;
+}
+
+std::optional<std::string> SliceSamples::next() {
+  if (next_row_ == height_) return std::nullopt;
+  std::string bytes;
+  while (next_row_ < height_ && bytes.size() < kBlockBytes) {
+    const auto samples = row(next_row_++);
+    bytes.append(reinterpret_cast<const char*>(samples.data()), samples.size());
+  }
+  return bytes;
+}
+
 SlicePng::SlicePng(std::shared_ptr<const CanonicalFile> volume, const SliceChoice& choice)
-    : volume_(std::move(volume)), choice_(choice) {
-  const CanonicalHeader& header = volume_->header();
-  const Plane plane = plane_of(choice.axis);
-  width_ = header.dims[plane.column];
-  height_ = header.dims[plane.row];
-  row_.resize(width_);
-  writer_ = std::make_unique<Writer>(bytes_);
-  check(
-      writer_->begin(width_, height_,
-                     {header.geometry.spacing[plane.column], header.geometry.spacing[plane.row]}));
+    : samples_(std::move(volume), choice.axis, choice.index),
+      window_(choice.window),
+      row_(samples_.width()),
+      writer_(std::make_unique<Writer>(bytes_)) {
+  check(writer_->begin(samples_.width(), samples_.height(), samples_.spacing()));
 }
 
 SlicePng::~SlicePng() = default;
 
 std::optional<std::string_view> SlicePng::next() {
   bytes_.erase(0, taken_);
-  if (next_row_ > height_ && bytes_.empty()) return std::nullopt;
+  if (next_row_ > samples_.height() && bytes_.empty()) return std::nullopt;
   std::size_t samples = 0;
-  while (next_row_ <= height_ && bytes_.size() < kBlockBytes && samples < kSamplesPerPiece) {
+  while (next_row_ <= samples_.height() && bytes_.size() < kBlockBytes &&
+         samples < kSamplesPerPiece) {
     write_row();
-    samples += width_;
+    samples += samples_.width();
   }
   taken_ = bytes_.size();
   return bytes_;
 }
 
 void SlicePng::write_row() {
-  if (next_row_ < height_) {
-    read_row(next_row_);
-    check(writer_->write(row_.data()));
-  } else {
+  if (next_row_ == samples_.height()) {
     check(writer_->end());
+  } else {
+    const auto bytes = samples_.row(next_row_);
+    with_sample(samples_.header().type, [&](auto kind) {
+      for (std::size_t column = 0; column < row_.size(); ++column) {
+        auto sample = kind;
+        std::memcpy(&sample, &bytes[column * sizeof(sample)], sizeof(sample));
+        row_[column] = grey(static_cast<double>(sample), window_);
+      }
+    });
+    check(writer_->write(row_.data()));
   }
   ++next_row_;
-}
-
-void SlicePng::read_row(std::uint32_t row) {
-  const CanonicalHeader& header = volume_->header();
-  const Plane plane = plane_of(choice_.axis);
-  const std::array<std::uint64_t, 3> stride = {1, header.dims[0],
-                                               std::uint64_t{header.dims[0]} * header.dims[1]};
-  const std::uint64_t first =
-      choice_.index * stride[plane.fixed] + std::uint64_t{row} * stride[plane.row];
-  const std::uint64_t step = stride[plane.column];
-  with_sample(header.type, [&](auto sample) { read_row_as<decltype(sample)>(first, step); });
-}
-
-template <class Sample>
-void SlicePng::read_row_as(std::uint64_t first, std::uint64_t step) {
-  const std::uint64_t step_bytes = step * sizeof(Sample);
-  const std::uint64_t together = step_bytes > kCloseBytes ? 1 : kReadBytes / step_bytes;
-  for (std::uint64_t begin = 0; begin < width_; begin += together) {
-    const std::uint64_t count = std::min<std::uint64_t>(together, width_ - begin);
-    block_.resize((count - 1) * step_bytes + sizeof(Sample));
-    volume_->read((first + begin * step) * sizeof(Sample), block_);
-    for (std::uint64_t n = 0; n < count; ++n) {
-      Sample sample;
-      std::memcpy(&sample, &block_[n * step_bytes], sizeof(Sample));
-      row_[begin + n] = grey(static_cast<double>(sample), choice_.window);
-    }
-  }
 }
 
 }  // namespace isomesh::volume

@@ -1,4 +1,4 @@
-// A slice of a canonical volume as an 8-bit grey PNG.
+// A slice of a canonical volume: its samples, or an 8-bit grey PNG.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,10 +27,40 @@ struct SliceChoice {
   std::array<double, 2> window = {};  // mapped to black and to white
 };
 
-// A PNG encoded in pieces while it is sent; reads only the samples of its slice. Columns run along
-// x (along y for the axis x), rows along y (along z for the axes x and y), both from sample 0,
-// without mirroring. Samples up to window[0] and NaN are black, from window[1] on white, linear
-// between them. The picture has its pixels' size (pHYs).
+// Reads the samples of a slice row by row, and no others. Columns run along x (along y for the axis
+// x), rows along y (along z for the axes x and y), both from sample 0, without mirroring. Not
+// thread safe.
+class SliceSamples {
+ public:
+  SliceSamples(std::shared_ptr<const CanonicalFile> volume, Axis axis, std::uint32_t index);
+
+  const CanonicalHeader& header() const { return volume_->header(); }
+  std::uint32_t width() const { return width_; }
+  std::uint32_t height() const { return height_; }
+  std::array<double, 2> spacing() const;  // millimetres between columns and between rows
+  std::uint64_t row_bytes() const { return width_ * bytes_per_sample(header().type); }
+
+  // Returns the samples of that row, little-endian; valid until the next call. Throws Error
+  // kInternal, and kUnusableVolume if the file was truncated.
+  std::span<const std::byte> row(std::uint32_t row);
+
+  // Returns the next rows in one piece; empty after the last row. Throws as row() does.
+  std::optional<std::string> next();
+
+ private:
+  std::shared_ptr<const CanonicalFile> volume_;
+  Axis axis_;
+  std::uint32_t index_;
+  std::uint32_t width_ = 0;
+  std::uint32_t height_ = 0;
+  std::uint32_t next_row_ = 0;  // of next()
+  std::vector<std::byte> row_;
+  std::vector<std::byte> block_;
+};
+
+// A PNG encoded in pieces while it is sent, with the rows and columns of SliceSamples. Samples up
+// to window[0] and NaN are black, from window[1] on white, linear between them. The picture has its
+// pixels' size (pHYs).
 //
 // The bytes depend only on the volume and the choice. Not thread safe.
 class SlicePng {
@@ -51,17 +82,11 @@ class SlicePng {
   struct Writer;
 
   void write_row();
-  void read_row(std::uint32_t row);
-  template <class Sample>
-  void read_row_as(std::uint64_t first, std::uint64_t step);
 
-  std::shared_ptr<const CanonicalFile> volume_;
-  SliceChoice choice_;
-  std::uint32_t width_ = 0;
-  std::uint32_t height_ = 0;
+  SliceSamples samples_;
+  std::array<double, 2> window_;
   std::uint32_t next_row_ = 0;
   std::vector<std::uint8_t> row_;
-  std::vector<std::byte> block_;
   std::string bytes_;  // encoded; next() returned the first taken_ of them
   std::size_t taken_ = 0;
   std::unique_ptr<Writer> writer_;

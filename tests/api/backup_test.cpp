@@ -75,7 +75,7 @@ TEST(Backup, IsWholeAlthoughTheDaemonWorks) {
     EXPECT_EQ(read_file(folder / "after.drc"), read_file(folder / "before.drc"));
     EXPECT_EQ(reader.histogram(kept, 2).counts.size(), 2U);
     // Every finished job has its mesh, and every volume its samples.
-    for (const Job& each : reader.jobs(JobState::kSucceeded).jobs) {
+    for (const Job& each : reader.jobs({.state = JobState::kSucceeded}).jobs) {
       EXPECT_NO_THROW(reader.fetch(each.id, MeshFormat::kDrc, folder / "each.drc"));
     }
     for (const Volume& each : reader.volumes()) EXPECT_NO_THROW(reader.histogram(each.id, 2));

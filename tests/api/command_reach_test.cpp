@@ -121,7 +121,7 @@ TEST(CommandInterrupted, EndsTheShellsLoop) {
   Process shell({"env", "--default-signal=INT", "bash", "-c",
                  "for round in 1 2; do " + mesh + "; echo round $round; done; echo end"});
   const auto is_running = [&] {
-    const auto jobs = daemon.client().jobs(JobState::kRunning).jobs;
+    const auto jobs = daemon.client().jobs({.state = JobState::kRunning}).jobs;
     return jobs.size() == 1 && jobs.front().stage == Stage::kSmooth;
   };
   ASSERT_TRUE(eventually(is_running));

@@ -142,8 +142,41 @@ TEST_F(InspectTest, APreviewIsTheVolumeReduced) {
   EXPECT_TRUE(whole.body.ends_with(sphere_.bytes));
 }
 
+TEST_F(InspectTest, ASliceHasTheSamplesThatWereUploaded) {
+  std::vector<std::int16_t> samples(2 * 3 * 4);
+  std::iota(samples.begin(), samples.end(), static_cast<std::int16_t>(-7));
+  const Volume volume = upload(
+      daemon_, {.bytes = bytes_of(samples), .query = "dims=2,3,4&type=int16", .options = {}});
+  const auto at = [&](std::size_t x, std::size_t y, std::size_t z) {
+    return samples[x + 2 * (y + 3 * z)];
+  };
+  const auto slice_of = [&](const std::string& query) {
+    return daemon_.get("/v1/volumes/" + volume.id + "/slice" + query);
+  };
+  const Answer z = slice_of("?index=3");
+  EXPECT_EQ(z.status, 200);
+  EXPECT_EQ(z.header("content-type"), "application/octet-stream");
+  EXPECT_EQ(z.header("isomesh-sample-type"), "int16");
+  EXPECT_EQ(z.header("isomesh-slice"), "2,3");
+  EXPECT_EQ(z.body, bytes_of(std::vector{at(0, 0, 3), at(1, 0, 3), at(0, 1, 3), at(1, 1, 3),
+                                         at(0, 2, 3), at(1, 2, 3)}));
+  const Answer y = slice_of("?axis=y&index=1");
+  EXPECT_EQ(y.header("isomesh-slice"), "2,4");
+  EXPECT_EQ(y.body, bytes_of(std::vector{at(0, 1, 0), at(1, 1, 0), at(0, 1, 1), at(1, 1, 1),
+                                         at(0, 1, 2), at(1, 1, 2), at(0, 1, 3), at(1, 1, 3)}));
+  const Answer x = slice_of("?axis=x");
+  EXPECT_EQ(x.header("isomesh-slice"), "3,4");
+  EXPECT_EQ(x.body, bytes_of(std::vector{at(1, 0, 0), at(1, 1, 0), at(1, 2, 0), at(1, 0, 1),
+                                         at(1, 1, 1), at(1, 2, 1), at(1, 0, 2), at(1, 1, 2),
+                                         at(1, 2, 2), at(1, 0, 3), at(1, 1, 3), at(1, 2, 3)}));
+  EXPECT_TRUE(blames(slice_of("?index=4"), "index"));
+  EXPECT_TRUE(blames(slice_of("?axis=w"), "axis"));
+  EXPECT_TRUE(blames(slice_of("?window=0,1"), "window"));
+}
+
 TEST_F(InspectTest, WhatNeverChangesIsNotSentTwice) {
-  for (const std::string what : {"/histogram", "/slice.png?index=2", "/preview?size=5"}) {
+  for (const std::string what :
+       {"/histogram", "/slice.png?index=2", "/slice?index=2", "/preview?size=5"}) {
     const Answer first = daemon_.get(path_ + what);
     EXPECT_THAT(first.header("cache-control"), testing::HasSubstr("immutable"));
     const std::string etag = first.header("etag");

@@ -1,4 +1,5 @@
 // Jobs over HTTP: submitting, waiting, cancelling, listing.
+#include <algorithm>
 #include <set>
 #include <string>
 #include <thread>
@@ -123,9 +124,55 @@ TEST_F(JobsTest, ARunningJobStopsWhenItIsCancelled) {
 
 TEST_F(JobsTest, AFinishedJobCannotBeCancelled) {
   const Job job = finished_job(daemon_);
-  const Answer answer = daemon_.send("DELETE", "/v1/jobs/" + job.id);
+  const Answer answer = daemon_.send("DELETE", "/v1/jobs/" + job.id + "?erase=false");
   EXPECT_EQ(answer.status, 200);
   EXPECT_EQ(job_from_json(answer.body), job);
+}
+
+TEST_F(JobsTest, AFinishedJobIsErasedWithItsFiles) {
+  const Job job = finished_job(daemon_);
+  const std::string path = "/v1/jobs/" + job.id;
+  const std::string blob = job.mesh->files.at(MeshFormat::kDrc).sha256;
+  const Job equal = daemon_.client().submit(job.parameters);
+  EXPECT_TRUE(blames(daemon_.send("DELETE", path + "?erase=no"), "erase"));
+  EXPECT_EQ(daemon_.send("DELETE", path, "", {{"If-Match", "\"x\""}}).status, 412);
+  EXPECT_EQ(daemon_.send("DELETE", path).status, 204);
+  for (const char* part : {"", "/mesh.drc", "/events"}) {
+    EXPECT_TRUE(is_problem(daemon_.get(path + part), ErrorCode::kNotFound)) << part;
+  }
+  EXPECT_EQ(daemon_.send("DELETE", path).status, 404);
+  EXPECT_EQ(daemon_.get("/v1/jobs/" + equal.id + "/mesh.drc").status, 200);
+  EXPECT_EQ(daemon_.send("DELETE", "/v1/jobs/" + equal.id).status, 204);
+  const auto is_gone = [&] {
+    const auto left = blobs_below(daemon_.data());
+    return std::ranges::none_of(left, [&](const auto& file) { return file.ends_with(blob); });
+  };
+  EXPECT_TRUE(eventually(is_gone));
+}
+
+TEST_F(JobsTest, AReportTellsWhatWasMadeOfWhatAndHow) {
+  const Job job = finished_job(daemon_);
+  const std::string path = "/v1/jobs/" + job.id + "/report";
+  const Answer answer = daemon_.get(path);
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const auto told = nlohmann::json::parse(answer.body);
+  EXPECT_FALSE(told.at("version").get<std::string>().empty());
+  EXPECT_FALSE(told.at("mesher").get<std::string>().empty());
+  EXPECT_EQ(job_from_json(told.at("job").dump()), job);
+  EXPECT_EQ(volume_from_json(told.at("volume").dump()),
+            daemon_.client().volume(job.parameters.volume));
+  EXPECT_EQ(daemon_.get(path, {{"If-None-Match", answer.header("etag")}}).status, 304);
+  daemon_.client().erase_volume(job.parameters.volume);
+  EXPECT_TRUE(nlohmann::json::parse(daemon_.get(path).body).at("volume").is_null());
+}
+
+TEST_F(JobsTest, AnErasedVolumeTakesItsJobsOnRequest) {
+  const Job job = finished_job(daemon_);
+  const std::string volume = "/v1/volumes/" + job.parameters.volume;
+  EXPECT_TRUE(blames(daemon_.send("DELETE", volume + "?jobs=all"), "jobs"));
+  EXPECT_EQ(daemon_.send("DELETE", volume + "?jobs=erase").status, 204);
+  EXPECT_TRUE(is_problem(daemon_.get(volume), ErrorCode::kNotFound));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs/" + job.id), ErrorCode::kNotFound));
 }
 
 TEST_F(JobsTest, AMeshBeforeItsTimeIsNotReady) {
@@ -314,7 +361,8 @@ TEST_F(JobsTest, ALongListComesInPieces) {
   EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?state=failed"), 0, 0), "");
   EXPECT_NE(expect_page(daemon_.get("/v1/jobs"), 0, 100), "") << "a page of the usual length";
   Client client = daemon_.client();
-  EXPECT_EQ(client.jobs(JobState::kSucceeded, client.jobs().next).jobs.front().id, ids[100]);
+  EXPECT_EQ(client.jobs({.state = JobState::kSucceeded}, client.jobs().next).jobs.front().id,
+            ids[100]);
   const Answer old = answer_to(daemon_.url(), "GET /v1/jobs?limit=1000 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(expect_page(old, 0, 250), "");
   const Answer plain = daemon_.get("/v1/jobs?limit=1000", {{"Accept-Encoding", "gzip, br"}});

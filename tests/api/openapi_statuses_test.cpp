@@ -105,7 +105,7 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.probe(post, "/v1/volumes?upload=" + std::string(32, '0'));
   statuses.probe("GET /v1/volumes", "/v1/volumes");
   statuses.probe("GET /v1/volumes", "/v1/volumes?cursor=x");
-  for (const std::string part : {"", "/histogram", "/labels", "/slice.png", "/preview"}) {
+  for (const std::string part : {"", "/histogram", "/labels", "/slice.png", "/slice", "/preview"}) {
     const std::string get = "GET /v1/volumes/{id}" + part;
     statuses.probe(get, "/v1/volumes/" + id + part);
     statuses.probe_one(get, "/v1/volumes/" + id + part, id);
@@ -174,10 +174,8 @@ void probe_jobs(Statuses& statuses, const Job& job) {
   statuses.probe("GET /v1/estimate", "/v1/estimate?iso=1&volume=" + job.parameters.volume);
   statuses.probe("GET /v1/estimate", "/v1/estimate?iso=1&volume=0123");
   statuses.probe("GET /v1/estimate", "/v1/estimate");
-  for (const std::string method : {"GET", "DELETE"}) {
-    statuses.probe(method + " /v1/jobs/{id}", "/v1/jobs/" + job.id);
-    statuses.probe_one(method + " /v1/jobs/{id}", "/v1/jobs/" + job.id, job.id);
-  }
+  statuses.probe("GET /v1/jobs/{id}", "/v1/jobs/" + job.id);
+  statuses.probe_one("GET /v1/jobs/{id}", "/v1/jobs/" + job.id, job.id);
   const std::string events = "GET /v1/jobs/{id}/events";
   statuses.probe(events, "/v1/jobs/" + job.id + "/events");
   statuses.probe(events, "/v1/jobs/" + job.id + "/events?x=1");
@@ -188,8 +186,18 @@ void probe_jobs(Statuses& statuses, const Job& job) {
   statuses.listen("GET /v1/events", "/v1/events?x=1");
 }
 
+void probe_erasing(Statuses& statuses, const Job& job) {
+  const std::string erase = "DELETE /v1/jobs/{id}";
+  const std::string path = "/v1/jobs/" + job.id;
+  statuses.probe(erase, path + "?erase=false");
+  statuses.probe(erase, path + "?x=1");
+  statuses.probe(erase, path, {}, {{"If-Match", "\"x\""}});
+  statuses.probe(erase, path);
+  statuses.probe(erase, path);
+}
+
 void probe_job_labels(Statuses& statuses, const Job& job, const Job& running) {
-  for (const std::string part : {"/labels", "/mesh.mtl"}) {
+  for (const std::string part : {"/labels", "/mesh.mtl", "/report"}) {
     const std::string get = "GET /v1/jobs/{id}" + part;
     const std::string path = "/v1/jobs/" + job.id + part;
     statuses.probe(get, path);
@@ -277,6 +285,7 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   probe_jobs(statuses, job_);
   probe_job_labels(statuses, job_, running);
   probe_meshes(statuses, job_, running);
+  probe_erasing(statuses, job_);
   probe_volumes(statuses, running, job_.parameters.volume);
   probe_uploads(statuses, daemon_);
   probe_damaged(statuses, daemon_);

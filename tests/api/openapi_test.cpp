@@ -206,6 +206,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"JobParameters", to_json(job.parameters)},
       {"JobList", to_json(std::vector{job})},
       {"JobEvent", to_json(JobEvent{})},
+      {"JobReport", daemon_.get("/v1/jobs/" + job_.id + "/report").body},
       {"Volume", to_json(volume)},
       {"VolumeList", to_json(std::vector{volume})},
       {"UploadedVolumes", to_json(std::vector{UploadedVolume{"ct.nrrd", 201, volume, job.error}})},

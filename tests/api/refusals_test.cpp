@@ -44,6 +44,8 @@ const std::vector<Wrong>& all_wrong() {
       {"GET", "/v1/estimate?volume=VOLUME&iso=1&", "scheme", {"scheme=7"}},
       {"GET", "/v1/estimate?volume=VOLUME&iso=1&", "format", {"format=doc"}},
       {"GET", "/v1/jobs?", "state", {"state=melted"}},
+      {"GET", "/v1/jobs?", "since", {"since=yesterday", "since=2026-02-30", "since="}},
+      {"GET", "/v1/jobs?", "until", {"until=2026-11-20T07:30:00+01:00"}},
       {"GET", "/v1/jobs?limit=", "limit", {"0", "1001", "-1", "x", ""}},
       {"GET", "/v1/jobs/JOB?wait=", "wait", {"soon", "-1", "inf", "nan", "1e999", ""}},
       {"POST", "/v1/volumes?type=uint8&dims=", "dims", {"21,20,18", "4294967295,4294967295,9"}},

@@ -3,6 +3,7 @@
 
   check.py compose FILE          of a compose file
   check.py chart < MANIFESTS     of a chart's manifests, as `helm template` renders them
+  check.py metrics FILE...       alert rules and dashboards name metrics and labels that the daemon has
 """
 import json
 import os
@@ -117,8 +118,32 @@ def check_chart():
         check(deployment["replicas"] == 3, "replicas")
 
 
+def check_metrics(files):
+    server = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "server")
+    known = set()
+    for folder, _, names in os.walk(server):
+        for name in names:
+            if name.endswith(".cpp"):
+                with open(os.path.join(folder, name), encoding="utf-8") as text:
+                    known |= set(re.findall(r'"(isomesh_\w+)"', text.read()))
+    for file in files:
+        with open(file, encoding="utf-8") as text:
+            content = text.read()
+        used = set(re.findall(r"\bisomesh_\w+", content))
+        check(used, f"{file} names no metric")
+        for metric in used:
+            check(metric in known or metric.removesuffix("_bucket") in known, f"{file} names {metric}, which the daemon lacks")
+    with open(files[-1], encoding="utf-8") as text:
+        panels = json.load(text)["panels"]
+    check(len({panel["id"] for panel in panels}) == len(panels), "panels have the same id")
+    places = {(panel["gridPos"]["x"], panel["gridPos"]["y"]) for panel in panels}
+    check(len(places) == len(panels), "panels lie on each other")
+
+
 if sys.argv[1] == "compose":
     check_compose(sys.argv[2])
+elif sys.argv[1] == "metrics":
+    check_metrics(sys.argv[2:])
 else:
     check_chart()
 print(f"{checks} checks")

@@ -104,8 +104,8 @@ class Kill : public FaultTest {
   // Waits until the job that has waited longest has ended. So that some end also on a slow machine,
   // every second life gets that far.
   void let_the_oldest_end() {
-    std::vector<Job> waiting = daemon().client().jobs(JobState::kRunning).jobs;
-    if (waiting.empty()) waiting = daemon().client().jobs(JobState::kQueued).jobs;
+    std::vector<Job> waiting = daemon().client().jobs({.state = JobState::kRunning}).jobs;
+    if (waiting.empty()) waiting = daemon().client().jobs({.state = JobState::kQueued}).jobs;
     if (!waiting.empty()) ended(waiting.back().id);
   }
 
@@ -141,7 +141,7 @@ class Kill : public FaultTest {
     std::size_t listed = 0;
     std::string cursor;
     do {
-      const JobPage page = daemon().client().jobs(std::nullopt, cursor);
+      const JobPage page = daemon().client().jobs({}, cursor);
       listed += page.jobs.size();
       cursor = page.next;
     } while (!cursor.empty());

@@ -303,6 +303,14 @@ class Proxy(Listener):
         self.requests = []
         super().__init__()
 
+    def answer(self, method, path, headers, body):
+        answer = self.fault(method, path, body) if self.fault else None
+        if answer is not None:
+            return answer
+        status, answer_headers, text = call(self.target, method, path, body or None, headers)
+        answer = (status, {"Content-Type": answer_headers.get("Content-Type", "")}, text)
+        return self.twist and self.twist(method, path, answer) or answer
+
     def _take(self, connection):
         threading.Thread(target=self._one, args=(connection,), daemon=True).start()
 
@@ -332,13 +340,8 @@ class Proxy(Listener):
                 return False
             body += piece
         self.requests.append((method, path))
-        answer = self.fault(method, path, body) if self.fault else None
-        if answer is None:
-            headers.pop("Host", None)
-            status, answer_headers, text = call(self.target, method, path, body or None, headers)
-            answer = (status, {"Content-Type": answer_headers.get("Content-Type", "")}, text)
-            if self.twist:
-                answer = self.twist(method, path, answer) or answer
+        headers.pop("Host", None)
+        answer = self.answer(method, path, headers, body)
         if callable(answer):
             return answer(connection)
         status, answer_headers, text = answer

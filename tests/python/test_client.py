@@ -111,6 +111,22 @@ class Files(DaemonTest):
             self.client.volume(volume)
         self.assertEqual(refused.exception.status, 404)
 
+    def test_erasing_takes_the_meshes(self):
+        volume = self.client.upload(ball() * 3)
+        first, second = (self.client.wait(self.client.submit(volume, iso=iso)) for iso in (-12, -9))
+        self.assertEqual([each["id"] for each in self.client.jobs(volume=volume)], [second["id"], first["id"]])
+        self.assertEqual(list(self.client.jobs(volume=volume, until="2020-01-01")), [])
+        self.assertEqual(self.client.report(first)["volume"]["id"], volume["id"])
+        self.client.erase_job(first)
+        self.assert_is_gone(first)
+        self.client.erase(volume, jobs=True)
+        self.assert_is_gone(second)
+
+    def assert_is_gone(self, job):
+        with self.assertRaises(isomesh.Refused) as refused:
+            self.client.job(job)
+        self.assertEqual(refused.exception.status, 404)
+
 
 class Jobs(DaemonTest):
     def test_step_by_step(self):

@@ -29,7 +29,9 @@ void check_stored(std::uint16_t status) {
   const int high_nibble = status >> 12;
   // A warning means that the object was stored.
   constexpr int kWarning = 0xB;
-  if (status == 0 || high_nibble == kWarning) return;
+  // The UID depends on the contents, so this is the same object.
+  constexpr std::uint16_t kDuplicate = 0x0111;
+  if (status == 0 || high_nibble == kWarning || status == kDuplicate) return;
   const std::string said = "the PACS did not store the mesh; its status is " + hex_of(status);
   constexpr int kDoesNotMatch = 0xA9;
   constexpr int kCannotUnderstand = 0xC;

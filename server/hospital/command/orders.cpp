@@ -91,6 +91,10 @@ class StepTimes {
 
 void show(const Order& order) {
   std::cout << order.id << ' ' << to_string(order.state) << reason_of(order) << '\n';
+  std::cout << "  ordered " << order.created << " from " << printable(order.source.pacs)
+            << ", study " << printable(order.source.study);
+  if (order.rule) std::cout << ", rule " << printable(*order.rule);
+  std::cout << '\n';
   if (order.next_attempt) std::cout << "  next attempt " << *order.next_attempt << '\n';
   for (const OrderResult& result : order.results) {
     std::cout << "  " << result.pacs << ' ' << (result.stored ? "has" : "lacks") << ' '

@@ -1,7 +1,6 @@
 #include "server/hospital/dicomweb/dicomweb.h"
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "base/files.h"
@@ -28,7 +27,9 @@ void check_status(const PeerResponseHead& head) {
   if (status >= 200 && status < 300) return;
   const std::string said = "the PACS responded with status " + std::to_string(status);
   if (status == 401 || status == 403) throw PacsFailure(PacsFault::kUnauthorized, said);
-  if (status == 408 || status == 425 || status == 429 || status >= 500) {
+  constexpr int kNotImplemented = 501;
+  const bool is_busy = status == 408 || status == 425 || status == 429 || status >= 500;
+  if (is_busy && status != kNotImplemented) {
     throw PacsFailure(PacsFault::kBusy, said, head.retry_after);
   }
   throw PacsFailure(PacsFault::kRefused, said);
@@ -86,13 +87,24 @@ bool names(const std::vector<PeersObject>& objects, const std::string& instance)
   return std::ranges::find(objects, instance, &PeersObject::instance) != objects.end();
 }
 
+// True if the PACS did not store the object because it has one with this UID. The UID depends on
+// the contents, so that is the same object.
+bool is_duplicate(std::optional<std::uint16_t> reason) {
+  constexpr std::uint16_t kDuplicate = 0x0111;   // PS3.7, C.5.9
+  constexpr std::uint16_t kAzureStored = 45070;  // these two: the DICOM service of Microsoft
+  constexpr std::uint16_t kAzureIsBeingStored = 45071;
+  return reason == kDuplicate || reason == kAzureStored || reason == kAzureIsBeingStored;
+}
+
 // Throws the reason given by the PACS for not storing the object (PS3.18, table I.2-2).
 [[noreturn]] void throw_not_stored(std::optional<std::uint16_t> reason) {
   constexpr std::uint16_t kOutOfResources = 0xA700;
+  constexpr std::uint16_t kProcessingFailure = 0x0110;
   const std::string said =
       reason ? "the PACS did not store the mesh and gave the reason " + std::to_string(*reason)
              : "the PACS did not store the mesh and gave no reason";
-  const bool may_pass = !reason || (*reason & 0xFF00) == kOutOfResources;
+  const bool may_pass =
+      !reason || (*reason & 0xFF00) == kOutOfResources || *reason == kProcessingFailure;
   throw PacsFailure(may_pass ? PacsFault::kBusy : PacsFault::kRefused, said);
 }
 
@@ -120,75 +132,113 @@ DicomWeb::DicomWeb(const orders::PacsSettings& settings, std::filesystem::path s
       most_series_bytes_(most_series_bytes),
       responses_(responses) {}
 
-std::vector<PeersObject> DicomWeb::search(const std::string& target, const std::stop_token& stop) {
+SearchPage DicomWeb::fetch_page(const std::string& target, const std::stop_token& stop) {
+  constexpr int kBadRequest = 400;
   constexpr int kNotFound = 404;
+  constexpr int kUnprocessable = 422;
+  constexpr std::size_t kEnoughOfRefusal = 4096;
   const ScratchFile response(scratch_, ".response");
   const PeerResponseHead head = peer_.send({.target = target,
                                             .accept = kDicomJson,
                                             .response_file = response.path(),
                                             .most_bytes = kMostResponseBytes},
                                            stop);
-  if (head.status == kNotFound) return {};  // some PACS respond so if nothing is found
+  if (head.status == kNotFound) return {.is_not_found = true};
+  if (head.status == kBadRequest || head.status == kUnprocessable) {
+    return {.refusal = InputFile(response.path()).text(0, kEnoughOfRefusal)};
+  }
   check_status(head);
-  return read_response(responses_, response.path()).objects;
+  return {.objects = read_response(responses_, response.path()).objects,
+          .has_more = head.has_more_results};
 }
 
-std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
-                                              std::string PeersObject::*name,
-                                              const std::stop_token& stop) {
-  constexpr std::size_t kPage = 1000;
-  constexpr std::size_t kMost = 100'000;
-  std::vector<PeersObject> all;
-  std::set<std::string> known;
-  while (known.size() < kMost) {
-    const std::vector<PeersObject> page = search(
-        target + "&limit=" + std::to_string(kPage) + "&offset=" + std::to_string(all.size()), stop);
-    const std::size_t before = known.size();
-    for (const PeersObject& object : page) {
-      if ((object.*name).empty()) {
-        throw PacsFailure(PacsFault::kUnreadable, "the PACS lists objects without UIDs");
-      }
-      if (known.insert(object.*name).second) all.push_back(object);
+SearchResults DicomWeb::search(const SearchQuery& query, const std::stop_token& stop) {
+  return search_all(query, [&](const std::string& target) { return fetch_page(target, stop); });
+}
+
+std::optional<PeersObject> DicomWeb::search_one(const std::string& target,
+                                                std::string PeersObject::*name,
+                                                const std::string& uid,
+                                                const std::stop_token& stop) {
+  // A PACS may ignore the UID in the query, and return other objects first.
+  const SearchResults results = search({.target = target, .uid = name, .only = uid}, stop);
+  const auto same = std::ranges::find(results.objects, uid, name);
+  if (same == results.objects.end()) return std::nullopt;
+  return *same;
+}
+
+orders::RecentSeries DicomWeb::find_recent(const std::string& from_day, const std::string& modality,
+                                           const std::stop_token& stop) {
+  const std::string days = "?StudyDate=" + percent_encode(from_day) + '-';
+  const std::string value = percent_encode(modality);
+  const std::string series_fields = kSeriesFields + (modality.empty() ? "" : "&Modality=" + value);
+  if (auto found = find_series_of_all_studies(days + '&' + series_fields, stop)) {
+    return *std::move(found);
+  }
+  const SearchResults studies =
+      search({.target = "/studies" + days + (modality.empty() ? "" : "&ModalitiesInStudy=" + value),
+              .uid = &PeersObject::study},
+             stop);
+  orders::RecentSeries recent = {.series = {}, .is_cut = studies.is_cut};
+  for (const PeersObject& study : studies.objects) {
+    const SearchResults series =
+        search({.target = "/studies/" + study.study + "/series?" + series_fields,
+                .uid = &PeersObject::series},
+               stop);
+    recent.is_cut = recent.is_cut || series.is_cut;
+    for (const PeersObject& object : series.objects) {
+      recent.series.push_back(series_of(object));
+      recent.series.back().study = study.study;
     }
-    // A PACS without paging returns everything each time, and some return smaller pages than
-    // requested. So only a page without new objects is the end.
-    if (known.size() == before) return all;
   }
-  throw Error(ErrorCode::kTooLarge, "the PACS found more than " + std::to_string(kMost) +
-                                        " objects, the most that are accepted");
+  return recent;
 }
 
-std::vector<FoundSeries> DicomWeb::find_recent(const std::string& from_day,
-                                               const std::string& modality,
-                                               const std::stop_token& stop) {
-  std::string target = "/series?StudyDate=" + percent_encode(from_day) + "-&" + kSeriesFields;
-  if (!modality.empty()) target += "&Modality=" + percent_encode(modality);
-  std::vector<FoundSeries> found;
-  for (const PeersObject& object : search_all(target, &PeersObject::series, stop)) {
-    if (!object.study.empty()) found.push_back(series_of(object));
+// A PACS need not support this search (PS3.18, 10.6.1). Such a PACS returns 400, 404 or another
+// status, or no UIDs of studies.
+std::optional<orders::RecentSeries> DicomWeb::find_series_of_all_studies(
+    const std::string& query, const std::stop_token& stop) {
+  try {
+    const SearchResults results =
+        search({.target = "/series" + query, .uid = &PeersObject::series}, stop);
+    if (results.is_not_found) return std::nullopt;
+    orders::RecentSeries recent = {.series = {}, .is_cut = results.is_cut};
+    for (const PeersObject& object : results.objects) {
+      if (object.study.empty()) return std::nullopt;
+      recent.series.push_back(series_of(object));
+    }
+    return recent;
+  } catch (const PacsFailure& failure) {
+    if (failure.may_pass()) throw;
+    return std::nullopt;
   }
-  return found;
 }
 
 std::optional<FoundSeries> DicomWeb::find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token& stop) {
-  const std::vector<PeersObject> found = search(
-      "/studies/" + study + "/series?SeriesInstanceUID=" + series + '&' + kSeriesFields, stop);
-  const auto same = std::ranges::find(found, series, &PeersObject::series);
-  if (same == found.end()) return std::nullopt;
-  return series_of(*same);
+  const auto found =
+      search_one("/studies/" + study + "/series?SeriesInstanceUID=" + series + '&' + kSeriesFields,
+                 &PeersObject::series, series, stop);
+  if (!found) return std::nullopt;
+  return series_of(*found);
 }
 
 std::vector<std::string> DicomWeb::list_instances(const std::string& study,
                                                   const std::string& series,
                                                   const std::stop_token& stop) {
-  std::vector<std::string> instances;
-  const std::string target =
-      "/studies/" + study + "/series/" + series + "/instances?includefield=00080018";
-  for (PeersObject& object : search_all(target, &PeersObject::instance, stop)) {
-    instances.push_back(std::move(object.instance));
+  SearchResults results = search(
+      {.target = "/studies/" + study + "/series/" + series + "/instances?includefield=00080018",
+       .uid = &PeersObject::instance},
+      stop);
+  if (results.is_cut) {
+    throw PacsFailure(PacsFault::kRefused,
+                      "the PACS lists only " + std::to_string(results.objects.size()) +
+                          " instances of the series, says that there are more, and ignores the "
+                          "offset of a search: increase the number of results that it returns");
   }
+  std::vector<std::string> instances;
+  for (PeersObject& object : results.objects) instances.push_back(std::move(object.instance));
   std::ranges::sort(instances);
   return instances;
 }
@@ -196,13 +246,23 @@ std::vector<std::string> DicomWeb::list_instances(const std::string& study,
 std::string DicomWeb::fetch_series(const std::string& study, const std::string& series,
                                    const std::filesystem::path& target,
                                    const std::stop_token& stop) {
-  const PeerResponseHead head =
-      peer_.send({.target = "/studies/" + study + "/series/" + series,
-                  .accept = "multipart/related; type=\"application/dicom\"; transfer-syntax=" +
-                            settings_.transfer_syntax,
-                  .response_file = target,
-                  .most_bytes = most_series_bytes_},
-                 stop);
+  const std::string accepted = "multipart/related; type=\"application/dicom\"";
+  const auto get = [&](const std::string& accept) {
+    return peer_.send({.target = "/studies/" + study + "/series/" + series,
+                       .accept = accept,
+                       .response_file = target,
+                       .most_bytes = most_series_bytes_},
+                      stop);
+  };
+  constexpr int kNotAcceptable = 406;
+  PeerResponseHead head = get(accepted + "; transfer-syntax=" + settings_.transfer_syntax);
+  // Some PACS do not know "*". Without it, they convert to Explicit VR Little Endian.
+  if (head.status == kNotAcceptable && settings_.transfer_syntax == "*") head = get(accepted);
+  if (head.status == kNotAcceptable) {
+    throw PacsFailure(PacsFault::kRefused,
+                      "the PACS does not send the series in the transfer syntax that was requested "
+                      "(status 406): set transfer-syntax of this PACS to one that it supports");
+  }
   constexpr int kPartialContent = 206;
   constexpr int kNotFound = 404;
   if (head.status == kPartialContent || head.status == kNotFound) {
@@ -214,18 +274,17 @@ std::string DicomWeb::fetch_series(const std::string& study, const std::string& 
 
 std::optional<std::string> DicomWeb::patient_of(const std::string& study,
                                                 const std::stop_token& stop) {
-  const std::vector<PeersObject> found =
-      search("/studies?StudyInstanceUID=" + study + '&' + kPatientField, stop);
-  const auto same = std::ranges::find(found, study, &PeersObject::study);
-  if (same == found.end()) return std::nullopt;
-  return same->patient_id;
+  const auto found = search_one("/studies?StudyInstanceUID=" + study + '&' + kPatientField,
+                                &PeersObject::study, study, stop);
+  if (!found) return std::nullopt;
+  return found->patient_id;
 }
 
 bool DicomWeb::has_instance(const orders::InstancePlace& place, const std::stop_token& stop) {
-  return names(search("/studies/" + place.study + "/series/" + place.series +
-                          "/instances?SOPInstanceUID=" + place.instance,
-                      stop),
-               place.instance);
+  return search_one("/studies/" + place.study + "/series/" + place.series +
+                        "/instances?SOPInstanceUID=" + place.instance,
+                    &PeersObject::instance, place.instance, stop)
+      .has_value();
 }
 
 void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
@@ -251,7 +310,10 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
   const std::string& instance = object.place.instance;
   if (names(said.stored, instance)) return;
   const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);
-  if (failed != said.failed.end()) throw_not_stored(failed->failure);
+  if (failed != said.failed.end()) {
+    if (is_duplicate(failed->failure)) return;
+    throw_not_stored(failed->failure);
+  }
   if (head.status == kConflict) {
     throw PacsFailure(PacsFault::kRefused, "the PACS responded with status 409");
   }

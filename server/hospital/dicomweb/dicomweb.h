@@ -4,13 +4,13 @@
 #include <filesystem>
 
 #include "server/hospital/dicomweb/http_peer.h"
+#include "server/hospital/dicomweb/search.h"
 #include "server/hospital/orders/pacs.h"
 #include "server/import/message/import_message.h"
 #include "server/jobs/library/import_runner.h"
 
 namespace isomesh::dicomweb {
 
-using import::PeersObject;
 using import::PeersResponse;
 
 // Parses a PACS's response in a confined process. Throws Error kPacsUnreachable if it cannot be
@@ -24,9 +24,8 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
   DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
            std::uint64_t most_series_bytes, jobs::ImportRunner& responses);
 
-  std::vector<orders::FoundSeries> find_recent(const std::string& from_day,
-                                               const std::string& modality,
-                                               const std::stop_token& stop) override;
+  orders::RecentSeries find_recent(const std::string& from_day, const std::string& modality,
+                                   const std::stop_token& stop) override;
   std::optional<orders::FoundSeries> find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token& stop) override;
@@ -41,11 +40,14 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:
-  // Returns one page of results.
-  std::vector<PeersObject> search(const std::string& target, const std::stop_token& stop);
-  // Returns the objects of all pages, each once; `name` is the member that identifies an object.
-  std::vector<PeersObject> search_all(const std::string& target, std::string PeersObject::*name,
-                                      const std::stop_token& stop);
+  SearchPage fetch_page(const std::string& target, const std::stop_token& stop);
+  SearchResults search(const SearchQuery& query, const std::stop_token& stop);
+  // Returns the object with that UID.
+  std::optional<PeersObject> search_one(const std::string& target, std::string PeersObject::*name,
+                                        const std::string& uid, const std::stop_token& stop);
+  // Empty if the PACS does not support the search.
+  std::optional<orders::RecentSeries> find_series_of_all_studies(const std::string& query,
+                                                                 const std::stop_token& stop);
 
   const orders::PacsSettings settings_;
   const HttpPeer peer_;

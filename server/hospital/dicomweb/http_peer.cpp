@@ -1,5 +1,7 @@
 #include "server/hospital/dicomweb/http_peer.h"
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 
 #include <fcntl.h>
@@ -31,6 +33,12 @@ std::string secret_in(const std::filesystem::path& file) {
   return secret;
 }
 
+// The encodings that libcurl decodes on Debian.
+bool is_decoded(std::string_view encoding) {
+  constexpr std::array<std::string_view, 5> kKnown = {"gzip", "x-gzip", "deflate", "br", "zstd"};
+  return std::ranges::find(kKnown, encoding) != kKnown.end();
+}
+
 class Exchange {
  public:
   Exchange(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)
@@ -48,6 +56,7 @@ class Exchange {
     const CURLcode result = curl::Transfer(easy_.get(), callbacks(), stop_).perform();
     if (result != CURLE_OK) throw_failure(result);
     PeerResponseHead head;
+    head.has_more_results = has_more_results_;
     long status = 0;
     curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
     head.status = static_cast<int>(status);
@@ -90,6 +99,10 @@ class Exchange {
   void set_request() {
     CURL* easy = easy_.get();
     curl::append(headers_, "Accept: " + request_.accept);
+    // Samples hardly shrink, so compression is not requested. Some PACS compress nevertheless; with
+    // this option, libcurl decompresses.
+    curl::append(headers_, "Accept-Encoding: identity");
+    curl_easy_setopt(easy, CURLOPT_ACCEPT_ENCODING, "");
     if (const RequestBody* body = request_.body) {
       curl::append(headers_, "Content-Type: " + body->content_type);
       curl::append(headers_, "Expect:");
@@ -113,11 +126,29 @@ class Exchange {
       write_all(target_, bytes);
       return true;
     };
+    callbacks.header = [this](std::string_view line) { note_header(lower(line)); };
     return callbacks;
   }
 
-  [[noreturn]] static void throw_failure(CURLcode result) {
+  void note_header(std::string_view line) {
+    // The standard has only this one text; its number of results and punctuation differ.
+    if (line.starts_with("warning:") && line.find("additional results") != line.npos) {
+      has_more_results_ = true;
+    }
+    constexpr std::string_view kEncoding = "content-encoding:";
+    if (line.starts_with(kEncoding)) encoding_ = trimmed(line.substr(kEncoding.size()));
+  }
+
+  [[noreturn]] void throw_failure(CURLcode result) const {
     switch (result) {
+      case CURLE_BAD_CONTENT_ENCODING:
+        if (is_decoded(encoding_)) {
+          throw PacsFailure(PacsFault::kUnreadable,
+                            "the compressed response of the PACS is damaged");
+        }
+        throw PacsFailure(PacsFault::kRefused,
+                          "the PACS compresses its responses in a way that cannot be read "
+                          "(Content-Encoding), although this was not requested");
       case CURLE_OPERATION_TIMEDOUT:
         throw PacsFailure(PacsFault::kTimeout, "the PACS does not respond");
       case CURLE_PEER_FAILED_VERIFICATION:
@@ -140,6 +171,8 @@ class Exchange {
   const std::stop_token stop_;
   const Descriptor target_;
   std::uint64_t received_ = 0;
+  bool has_more_results_ = false;
+  std::string encoding_;  // of the response's body
   curl::Headers headers_;
   const curl::Easy easy_;  // last: has pointers to the members above
 };

@@ -32,6 +32,7 @@ struct PeerResponseHead {
   int status = 0;
   std::string content_type;  // as sent by the PACS; printable characters only
   std::chrono::seconds retry_after{0};
+  bool has_more_results = false;  // a Warning header says so (PS3.18, 8.3.4.4)
 };
 
 // Thread safe.

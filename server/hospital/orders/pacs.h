@@ -55,6 +55,11 @@ struct FoundSeries {
   std::optional<std::uint32_t> instances;  // empty: unknown
 };
 
+struct RecentSeries {
+  std::vector<FoundSeries> series;
+  bool is_cut = false;  // the PACS has more, but does not list them
+};
+
 struct InstancePlace {
   std::string study;
   std::string series;
@@ -97,9 +102,8 @@ class SeriesSource {
 class Archive : public SeriesSource {
  public:
   // Series of studies since that day (DA), of that modality unless it is empty.
-  virtual std::vector<FoundSeries> find_recent(const std::string& from_day,
-                                               const std::string& modality,
-                                               const std::stop_token& stop) = 0;
+  virtual RecentSeries find_recent(const std::string& from_day, const std::string& modality,
+                                   const std::stop_token& stop) = 0;
 
   // The study's Patient ID; empty if there is no such study.
   virtual std::optional<std::string> patient_of(const std::string& study,
@@ -113,7 +117,8 @@ class ObjectReceiver {
  public:
   virtual ~ObjectReceiver() = default;
 
-  // Returns once the PACS has confirmed that it stored this object.
+  // Returns once the PACS has confirmed that it stored this object, or that it has one with this
+  // UID, which an earlier attempt stored.
   virtual void store(const OutgoingObject& object, const std::stop_token& stop) = 0;
 };
 

@@ -10,6 +10,7 @@
 #include "proto/json.h"
 #include "server/hospital/orders/make_objects.h"
 #include "server/hospital/orders/received.h"
+#include "server/hospital/orders/step_records.h"
 #include "server/jobs/library/complete_labels.h"
 
 namespace isomesh::orders {
@@ -61,67 +62,10 @@ void check_count_of_objects(const Order& order, const Job& job) {
                   " objects; order fewer labels, or send them as obj");
 }
 
-// An object with such a text would rename the patient in the PACS, or be filed under another one.
-void check_identity(const DicomIdentity& identity) {
-  for (const auto& [name, text] : {std::pair{"Patient's Name", &identity.patient_name},
-                                   {"Patient ID", &identity.patient_id},
-                                   {"Issuer of Patient ID", &identity.issuer_of_patient_id},
-                                   {"Patient's Birth Date", &identity.patient_birth_date},
-                                   {"Patient's Sex", &identity.patient_sex},
-                                   {"Accession Number", &identity.accession_number},
-                                   {"Study ID", &identity.study_id}}) {
-    if (text->find("\xEF\xBF\xBD") == text->npos) continue;
-    throw Error(ErrorCode::kUnusableVolume,
-                std::string("the ") + name +
-                    " of the images has bytes that mean nothing in their Specific Character Set: "
-                    "correct the images, and submit the order again");
-  }
-}
-
 bool has_bytes(const std::filesystem::path& file) {
   std::error_code missing;
   const std::uintmax_t bytes = std::filesystem::file_size(file, missing);
   return !missing && bytes > 0;
-}
-
-// An entry of the audit trail that has not succeeded yet.
-store::AuditEntry transfer(const store::OrderRecord& record, const std::string& pacs,
-                           const std::string& direction, const std::string& study) {
-  return {.event = store::AuditEvent::kTransferred,
-          .success = false,
-          .order = record.order.id,
-          .owner = record.owner,
-          .peer_name = pacs,
-          .direction = direction,
-          .study = study};
-}
-
-// The same for one of the order's objects.
-store::AuditEntry transfer_out(const store::OrderRecord& record, const OrderResult& result) {
-  const DicomIdentity& identity = *record.work.identity;
-  store::AuditEntry entry = transfer(record, result.pacs, "out", identity.study_uid);
-  entry.instances = 1;
-  entry.patient_id = identity.patient_id;
-  return entry;
-}
-
-// The object, as in OrderWork::sending.
-std::string object_of(const OrderResult& result) {
-  return result.pacs + ' ' + result.sop_instance_uid;
-}
-
-// Resets the list of instances, the images, and all results from them.
-void forget_images(store::OrderRecord& record) {
-  record.order.state = OrderState::kWaiting;
-  record.order.volume.reset();
-  record.order.job.reset();
-  record.order.results.clear();
-  record.order.source.instances.reset();
-  record.work.identity.reset();
-  record.work.blobs.clear();
-  record.work.listed.clear();
-  record.work.listed_since.reset();
-  record.work.triangles.reset();
 }
 
 }  // namespace
@@ -234,10 +178,14 @@ Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_tok
     work.listed_since = timestamp_of(now);
   }
   const Time settled = time_of(*work.listed_since) + settings_.settle;
-  const bool is_whole = !series->instances || *series->instances == listed.size();
-  if (now < settled || !is_whole) {
-    const Time poll = now + settings_.poll;
-    return save_after(OrderState::kWaiting, record, now < settled ? std::min(settled, poll) : poll);
+  if (now < settled) {
+    return save_after(OrderState::kWaiting, record, std::min(settled, now + settings_.poll));
+  }
+  if (series->instances && *series->instances != listed.size()) {
+    throw PacsFailure(PacsFault::kIncomplete,
+                      "the PACS lists " + std::to_string(listed.size()) +
+                          " instances of the series, but says that it has " +
+                          std::to_string(*series->instances));
   }
   source.instances = static_cast<std::uint32_t>(listed.size());
   record.order.state = OrderState::kFetching;
@@ -384,107 +332,6 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::sto
   }
   record.order.state = OrderState::kSending;
   return save_after(OrderState::kMeshing, record, now_());
-}
-
-bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderResult& result,
-                                 const std::stop_token& stop) const {
-  const DicomIdentity& identity = *record.work.identity;
-  if (const auto& archive = peer(result.pacs).archive) {
-    const auto patient = archive->patient_of(identity.study_uid, stop);
-    if (patient) return *patient == identity.patient_id;
-  }
-  // Only the PACS of the images must know the study.
-  if (result.pacs != record.order.source.pacs) return true;
-  throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
-}
-
-void OrderSteps::check_patient(store::OrderRecord& record, std::size_t index,
-                               const std::stop_token& stop) const {
-  if (!is_same_patient(record, record.order.results[index], stop)) {
-    forget_images(record);
-    // Failures are kept until the order succeeds, because each attempt may store other objects of
-    // it.
-    record.work.failed_in = OrderState::kSucceeded;
-    throw PacsFailure(PacsFault::kChanged,
-                      "the study has another Patient ID than the images; they are fetched again");
-  }
-}
-
-void OrderSteps::check_object(store::OrderRecord& record, std::size_t index,
-                              const std::stop_token& stop) const {
-  if (!store::is_there_and_intact(services_.blobs, record.work.blobs[index], stop)) {
-    record.order.state = OrderState::kMeshing;
-    record.work.failed_in = OrderState::kSucceeded;
-    throw Error(ErrorCode::kUnavailable,
-                "the object is damaged or missing in the store; it is made again");
-  }
-}
-
-void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
-                          const std::stop_token& stop) const {
-  const OrderResult& result = record.order.results[index];
-  const DicomIdentity& identity = *record.work.identity;
-  const auto blob = services_.blobs.open(record.work.blobs[index]);
-  const auto& receiver = peer(result.pacs).receiver;
-  if (!receiver) {
-    throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
-  }
-  const InstancePlace place = {.study = identity.study_uid,
-                               .series = result.series_uid,
-                               .instance = result.sop_instance_uid};
-  store::AuditEntry entry = transfer_out(record, result);
-  if (record.work.sending != object_of(result)) {
-    record.work.sending = object_of(result);
-    save(record, now_());
-  }
-  try {
-    receiver->store(
-        {.place = place,
-         .sop_class = result.sop_class_uid,
-         .bytes = blob->size(),
-         .read = [&](std::uint64_t offset,
-                     std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
-         .file = services_.blobs.local(record.work.blobs[index])},
-        stop);
-    // A confirmed store proves nothing, so the object is queried.
-    if (has_instance(result.pacs, place, stop) == false) {
-      throw PacsFailure(PacsFault::kNotStored,
-                        "the PACS confirmed that it stored the mesh, but does not find it");
-    }
-  } catch (const Error&) {
-    services_.audit.add(entry);
-    throw;
-  }
-  entry.success = true;
-  services_.audit.add(entry);
-}
-
-Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) const {
-  if (!record.order.results.empty()) check_identity(record.work.identity.value());
-  for (std::size_t index = 0; index < record.order.results.size(); ++index) {
-    OrderResult& result = record.order.results[index];
-    if (result.stored) continue;
-    const InstancePlace place = {.study = record.work.identity->study_uid,
-                                 .series = result.series_uid,
-                                 .instance = result.sop_instance_uid};
-    // First: an object with the same UIDs may be that of another patient.
-    check_patient(record, index, stop);
-    if (has_instance(result.pacs, place, stop) != true) {
-      check_object(record, index, stop);
-      send_one(record, index, stop);
-    } else if (record.work.sending == object_of(result)) {
-      // An earlier attempt stored it, but its confirmation was lost.
-      store::AuditEntry entry = transfer_out(record, result);
-      entry.success = true;
-      services_.audit.add(entry);
-    }
-    result.stored = true;
-    record.work.sending.reset();
-    save_after(OrderState::kSending, record, now_());
-  }
-  record.order.state = OrderState::kSucceeded;
-  record.order.finished = timestamp_of(now_());
-  return save_after(OrderState::kSucceeded, record, now_());
 }
 
 }  // namespace isomesh::orders

@@ -84,8 +84,12 @@ class OrderSteps {
   // As above, but throws Error kUnavailable if the object is damaged or missing.
   void check_object(store::OrderRecord& record, std::size_t index,
                     const std::stop_token& stop) const;
-  // Saves beforehand that the order sends the object.
-  void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
+  // Saves beforehand that the order sends the object. Returns false if the PACS says that it has
+  // the object, but does not list it.
+  bool send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
+  // Saves the order, and returns when the PACS is queried again for an object that it does not list
+  // yet. Throws PacsFailure kNotStored after some time.
+  store::Time look_again(store::OrderRecord& record, std::size_t index) const;
   // Saves the order after `step` has succeeded, and resets failures of that and earlier steps.
   // Returns `next`. Throws OrderIsOver.
   store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;

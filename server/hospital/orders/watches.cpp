@@ -33,9 +33,9 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
   if (peer == services_.peers.end() || !peer->second.archive) return;
   try {
     bool is_told = false;
-    const auto found = peer->second.archive->find_recent(
+    const RecentSeries found = peer->second.archive->find_recent(
         day_before(options_.now(), rule.match.days), rule.match.modality, stop);
-    for (const FoundSeries& series : found) {
+    for (const FoundSeries& series : found.series) {
       if (!is_wanted(series, rule.match)) continue;
       const store::OrderRecord record = make_order(rule, *rule.watch, series);
       const bool is_new = services_.orders.submit_watched(
@@ -53,6 +53,9 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
       }
       log(record, "");
       changed();
+    }
+    if (found.is_cut) {
+      throw PacsFailure(PacsFault::kIncomplete, "the PACS does not list all recent series");
     }
     note_success(*rule.watch);
   } catch (const PacsFailure& failure) {

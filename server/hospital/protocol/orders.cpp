@@ -82,6 +82,7 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("triangles", self.triangles);
   field("queried", self.queried);
   field("sending", self.sending);
+  field("confirmed", self.confirmed);
   field("failed_in", self.failed_in);
   field("contents", self.contents);
 }

@@ -107,6 +107,8 @@ struct OrderWork {
   // The object that is being sent, or whose sending failed: the PACS, a blank, the SOP Instance
   // UID.
   std::optional<std::string> sending = {};
+  // Since when its PACS says that it has this object, but does not list it.
+  std::optional<std::string> confirmed = {};
   // The failures are forgotten once this step succeeds. Empty: there were none.
   std::optional<OrderState> failed_in = {};
 

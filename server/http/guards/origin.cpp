@@ -106,11 +106,11 @@ void allow_reading(const OriginRules& rules, const Request& request, Response& r
   const std::string_view origin = request.header(kOrigin);
   if (origin.empty() || !is_allowed(rules, origin)) return;
   response.set_header("Access-Control-Allow-Origin", origin);
-  response.set_header(
-      "Access-Control-Expose-Headers",
-      "Accept-Ranges, Allow, Content-Disposition, Content-Range, ETag, "
-      "Isomesh-Upload, Location, Repr-Digest, Retry-After, Server-Timing, Upload-Complete, "
-      "Upload-Length, Upload-Limit, Upload-Offset, X-Request-Id");
+  response.set_header("Access-Control-Expose-Headers",
+                      "Accept-Ranges, Allow, Content-Disposition, Content-Range, ETag, "
+                      "Isomesh-Sample-Type, Isomesh-Slice, Isomesh-Upload, Location, Repr-Digest, "
+                      "Retry-After, Server-Timing, Upload-Complete, "
+                      "Upload-Length, Upload-Limit, Upload-Offset, X-Request-Id");
 }
 
 bool is_preflight(const OriginRules& rules, const Request& request) {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/base64.h"
+#include "base/clock.h"
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "base/text.h"
@@ -193,6 +194,29 @@ std::int64_t whole_number_of(const Request& request, const std::string& name,
   const auto number = parse_int64(text);
   if (!number || text.starts_with('+')) throw invalid_parameter(name, "must be a whole number");
   return *number;
+}
+
+bool flag_of(const Request& request, const std::string& name, bool otherwise) {
+  if (!request.has_parameter(name)) return otherwise;
+  const std::string_view text = request.parameter(name);
+  if (text != "true" && text != "false") throw invalid_parameter(name, "must be true or false");
+  return text == "true";
+}
+
+std::optional<std::chrono::system_clock::time_point> instant_of(const Request& request,
+                                                                const std::string& name) {
+  if (!request.has_parameter(name)) return std::nullopt;
+  constexpr std::size_t kDay = std::string_view("2026-11-20").size();
+  constexpr std::size_t kSecond = std::string_view("2026-11-20T07:30:00Z").size();
+  std::string text(request.parameter(name));
+  if (text.size() == kDay) text += "T00:00:00Z";
+  if (text.size() == kSecond) text.insert(kSecond - 1, ".000");
+  const auto time = time_of(text);
+  if (timestamp_of(time) != text) {
+    throw invalid_parameter(
+        name, "must be a day such as 2026-11-20, or a time in UTC such as 2026-11-20T07:30:00Z");
+  }
+  return time;
 }
 
 std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name) {

@@ -58,6 +58,13 @@ std::uint64_t whole_number_of(const Request& request, const std::string& name,
 std::int64_t whole_number_of(const Request& request, const std::string& name,
                              std::int64_t otherwise);
 
+// True or false; `otherwise` if missing.
+bool flag_of(const Request& request, const std::string& name, bool otherwise);
+
+// A day, or a time in UTC as responses write it; empty if missing.
+std::optional<std::chrono::system_clock::time_point> instant_of(const Request& request,
+                                                                const std::string& name);
+
 // Two finite ascending numbers; empty without the parameter.
 std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name);
 

@@ -31,6 +31,7 @@ void histogram(App& app, const Request& request, Response& response) {
                     "application/json");
 }
 
+// Without the window.
 volume::SliceChoice slice_choice(const Request& request, const Volume& volume) {
   volume::SliceChoice choice;
   if (request.has_parameter("axis")) {
@@ -41,21 +42,44 @@ volume::SliceChoice slice_choice(const Request& request, const Volume& volume) {
   const std::uint32_t slices = volume.dims.at(static_cast<std::size_t>(choice.axis));
   choice.index =
       static_cast<std::uint32_t>(whole_number_of(request, "index", {0, slices - 1}, slices / 2));
-  choice.window = interval_of(request, "window").value_or(volume.range);
   return choice;
+}
+
+std::shared_ptr<const volume::CanonicalFile> samples_of(const App& app, const Volume& volume) {
+  return std::make_shared<const volume::CanonicalFile>(
+      jobs::intact_volume(app.services.blobs, volume.samples).path);
+}
+
+void slice_samples(App& app, const Request& request, Response& response) {
+  check_known(request, {"axis", "index"});
+  const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
+  const volume::SliceChoice choice = slice_choice(request, volume);
+  const std::string etag = '"' + volume.id + ".samples." + std::string(to_string(choice.axis)) +
+                           std::to_string(choice.index) + '"';
+  if (is_known(request, response, etag, kForever)) return;
+  const auto slice =
+      std::make_shared<volume::SliceSamples>(samples_of(app, volume), choice.axis, choice.index);
+  response.status = 200;
+  response.set_header("Accept-Ranges", "none");
+  response.set_header("Isomesh-Sample-Type", std::string(to_string(volume.type)));
+  response.set_header("Isomesh-Slice",
+                      std::to_string(slice->width()) + ',' + std::to_string(slice->height()));
+  response.stream = {.source = computed_source([slice] { return slice->next(); }, false),
+                     .media_type = "application/octet-stream",
+                     .framing = Framing::kLength,
+                     .length = slice->row_bytes() * slice->height()};
 }
 
 void slice(App& app, const Request& request, Response& response) {
   check_known(request, {"axis", "index", "window"});
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
-  const volume::SliceChoice choice = slice_choice(request, volume);
+  volume::SliceChoice choice = slice_choice(request, volume);
+  choice.window = interval_of(request, "window").value_or(volume.range);
   const std::string etag = '"' + volume.id + '.' + std::string(to_string(choice.axis)) +
                            std::to_string(choice.index) + '.' + to_text(choice.window[0]) + '.' +
                            to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag, kForever)) return;
-  const auto canonical = std::make_shared<const volume::CanonicalFile>(
-      jobs::intact_volume(app.services.blobs, volume.samples).path);
-  const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
+  const auto picture = std::make_shared<volume::SlicePng>(samples_of(app, volume), choice);
   response.set_header("Accept-Ranges", "none");
   answer_pieces(request, response, "image/png",
                 [picture] { return std::optional<std::string>(picture->next()); });
@@ -71,9 +95,7 @@ void preview(App& app, const Request& request, Response& response) {
   const std::string etag = '"' + volume.id + ".preview" + std::to_string(choice.most) + '.' +
                            to_text(choice.window[0]) + '.' + to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag, kForever)) return;
-  const auto canonical = std::make_shared<const volume::CanonicalFile>(
-      jobs::intact_volume(app.services.blobs, volume.samples).path);
-  const auto reduced = std::make_shared<volume::PreviewNrrd>(canonical, choice);
+  const auto reduced = std::make_shared<volume::PreviewNrrd>(samples_of(app, volume), choice);
   const auto next = [reduced] { return std::optional<std::string>(reduced->next()); };
   response.status = 200;
   response.set_header("Accept-Ranges", "none");
@@ -113,6 +135,9 @@ void add_inspect_routes(App& app) {
                    [&app](const auto& request, auto& response) { labels(app, request, response); });
   add_computed_get(app, volume + "/slice.png",
                    [&app](const auto& request, auto& response) { slice(app, request, response); });
+  add_computed_get(app, volume + "/slice", [&app](const auto& request, auto& response) {
+    slice_samples(app, request, response);
+  });
   add_computed_get(app, volume + "/preview", [&app](const auto& request, auto& response) {
     preview(app, request, response);
   });

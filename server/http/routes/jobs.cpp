@@ -68,13 +68,20 @@ std::vector<Job> rows_of(std::vector<Job> jobs) {
   return jobs;
 }
 
-void list(App& app, const Request& request, Response& response) {
-  check_known(request, {"state", "cursor", "limit"});
-  std::optional<JobState> state;
+store::JobFilter filter_of(const Request& request) {
+  store::JobFilter filter = {.since = instant_of(request, "since"),
+                             .until = instant_of(request, "until")};
   if (request.has_parameter("state")) {
-    state = from_string<JobState>(request.parameter("state"));
-    if (!state) throw invalid_parameter("state", "must be " + names_of<JobState>());
+    filter.state = from_string<JobState>(request.parameter("state"));
+    if (!filter.state) throw invalid_parameter("state", "must be " + names_of<JobState>());
   }
+  if (request.has_parameter("volume")) filter.volume = request.parameter("volume");
+  return filter;
+}
+
+void list(App& app, const Request& request, Response& response) {
+  check_known(request, {"state", "volume", "since", "until", "cursor", "limit"});
+  const store::JobFilter filter = filter_of(request);
   const std::string after = id_after(request, kJobCursor);
   const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
   answer_list<Job>(
@@ -82,19 +89,26 @@ void list(App& app, const Request& request, Response& response) {
       {.kind = kJobCursor,
        .after = after,
        .limit = limit,
-       .read = [&jobs = app.services.jobs, viewer = viewer_of(request), state](
+       .read = [&jobs = app.services.jobs, viewer = viewer_of(request), filter](
                    const std::string& from,
-                   std::size_t count) { return rows_of(jobs.list(viewer, state, from, count)); },
+                   std::size_t count) { return rows_of(jobs.list(viewer, filter, from, count)); },
        .place_of = [](const Job& job) { return job.id; }});
 }
 
-void cancel(App& app, const Request& request, Response& response) {
-  check_known(request, {});
+// Cancels a job that has not ended, and erases one that has.
+void cancel_or_erase(App& app, const Request& request, Response& response) {
+  check_known(request, {"erase"});
+  const bool may_erase = flag_of(request, "erase", true);
   const std::string id = request.path_parameter("id");
+  const store::Viewer viewer = viewer_of(request);
   if (request.has_header("If-Match")) {
-    check_if_match(request, etag_of(to_json(app.services.jobs.get(viewer_of(request), id))));
+    check_if_match(request, etag_of(to_json(app.services.jobs.get(viewer, id))));
   }
-  answer_json(response, 200, to_json(app.services.jobs.cancel(viewer_of(request), id)));
+  if (may_erase && app.services.library.erase_job(app.services.jobs, viewer, id)) {
+    response.status = 204;
+    return;
+  }
+  answer_json(response, 200, to_json(app.services.jobs.cancel(viewer, id)));
 }
 
 // All events of the job so far, without superseded progress.
@@ -172,8 +186,9 @@ void add_job_routes(App& app) {
                    [&app](const auto& request, auto& response) { list(app, request, response); });
   add_get(app, kJobs + "/{id}",
           [&app](const auto& request, auto& response) { return get(app, request, response); });
-  add_delete(app, kJobs + "/{id}",
-             [&app](const auto& request, auto& response) { cancel(app, request, response); });
+  add_delete(app, kJobs + "/{id}", [&app](const auto& request, auto& response) {
+    cancel_or_erase(app, request, response);
+  });
   add_get(app, kJobs + "/{id}/events",
           [&app](const auto& request, auto& response) { events(app, request, response); });
   add_get(app, "/v1/events",

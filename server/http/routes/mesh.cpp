@@ -12,6 +12,7 @@
 #include "proto/fields.h"
 #include "proto/json.h"
 #include "server/codec/formats.h"
+#include "server/codec/mesher_version.h"
 #include "server/http/app/outcomes.h"
 #include "server/http/limits.h"
 #include "server/http/requests/import_query.h"
@@ -214,6 +215,28 @@ void list_labels(const App& app, const Request& request, Response& response) {
   answer_tagged_json(request, response, to_json(page, next));
 }
 
+// As JSON; null if it is gone.
+std::string volume_of(const App& app, const Request& request, const Job& job) {
+  try {
+    Volume volume = app.services.volumes.get(viewer_of(request), job.parameters.volume);
+    if (volume.dicom) volume.dicom->instances.clear();
+    return to_json(volume);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+    return "null";
+  }
+}
+
+void report(const App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
+  check_has_mesh(job);
+  answer_tagged_json(request, response,
+                     "{\"version\":\"" ISOMESH_VERSION "\",\"mesher\":\"" +
+                         std::string(codec::kMesherVersion) + "\",\"job\":" + to_json(job) +
+                         ",\"volume\":" + volume_of(app, request, job) + '}');
+}
+
 void answer_materials(const App& app, const Request& request, Response& response) {
   check_known(request, {});
   const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
@@ -286,6 +309,8 @@ void add_mesh_routes(App& app) {
   add_computed_get(app, "/v1/jobs/{id}/labels", [&app](const auto& request, auto& response) {
     list_labels(app, request, response);
   });
+  add_computed_get(app, "/v1/jobs/{id}/report",
+                   [&app](const auto& request, auto& response) { report(app, request, response); });
   add_post(app, "/v1/mesh", [&app](const auto& request, auto& response) {
     return mesh_in_one(app, request, response);
   });

@@ -17,13 +17,7 @@ constexpr const char* kVolumeCursor = "volumes";
 // The name of a rejected upload that is kept; clients send it as the request's parameter `upload`.
 constexpr const char* kUploadHeader = "Isomesh-Upload";
 
-bool is_to_be_kept(const Request& request) {
-  const std::string_view keep = request.has_parameter("keep") ? request.parameter("keep") : "false";
-  if (keep != "true" && keep != "false") {
-    throw invalid_parameter("keep", "must be true or false");
-  }
-  return keep == "true";
-}
+bool is_to_be_kept(const Request& request) { return flag_of(request, "keep", false); }
 
 // The request's body, or a kept upload.
 KeptBody body_of(App& app, const Request& request) {
@@ -168,13 +162,22 @@ void rename(App& app, const Request& request, Response& response) {
   answer_json(response, 200, to_json(app.services.library.rename(owner_of(request), id, name)));
 }
 
+store::Made what_was_made_of(const Request& request) {
+  const std::string_view jobs = request.has_parameter("jobs") ? request.parameter("jobs") : "keep";
+  if (jobs != "keep" && jobs != "erase") {
+    throw invalid_parameter("jobs", R"(must be "keep" or "erase")");
+  }
+  return jobs == "erase" ? store::Made::kErased : store::Made::kKept;
+}
+
 void erase(App& app, const Request& request, Response& response) {
-  check_known(request, {});
+  check_known(request, {"jobs"});
+  const store::Made made = what_was_made_of(request);
   const std::string id = request.path_parameter("id");
   if (request.has_header("If-Match")) {
     check_if_match(request, etag_of(to_json(app.services.volumes.get(viewer_of(request), id))));
   }
-  app.services.library.erase(viewer_of(request), id);
+  app.services.library.erase(viewer_of(request), id, made);
   response.status = 204;
 }
 

@@ -83,44 +83,85 @@ bool is_closing(Window& window) {
   return window.view().starts_with("--");
 }
 
-// Skips the rest of the boundary's line and the part's headers, up to the empty line.
-void skip_head(Window& window) {
-  std::size_t bytes = 0;
-  // The empty line may directly follow the boundary's line.
-  if (!take_until(window, "\r\n", [&](std::string_view text) { bytes += text.size(); })) {
-    throw_cut();
-  }
-  while (true) {
-    std::size_t line = 0;
-    if (!take_until(window, "\r\n", [&](std::string_view text) { line += text.size(); })) {
-      throw_cut();
-    }
+// Skips one line, with its line break. Returns its length without the break, which may be LF alone;
+// `break_bytes` is the length of the break.
+std::size_t skip_line(Window& window, std::size_t& break_bytes) {
+  std::size_t length = 0;
+  char last = '\0';
+  const bool is_whole = take_until(window, "\n", [&](std::string_view text) {
+    length += text.size();
+    if (!text.empty()) last = text.back();
+  });
+  if (!is_whole) throw_cut();
+  break_bytes = last == '\r' ? 2 : 1;
+  return length - (break_bytes - 1);
+}
+
+// Skips the rest of the boundary's line and the part's headers, up to the empty line. Returns the
+// line break of the boundary's line: some PACS end lines with LF alone.
+std::string skip_head(Window& window) {
+  std::size_t break_bytes = 0;
+  std::size_t bytes = skip_line(window, break_bytes);
+  const std::string line_break = break_bytes == 2 ? "\r\n" : "\n";
+  while (const std::size_t line = skip_line(window, break_bytes)) {
     bytes += line;
-    if (line == 0) return;
     if (bytes > kLongestHead) {
       throw Error(ErrorCode::kSeriesIncomplete, "a part of the PACS's response is empty");
     }
   }
+  return line_break;
+}
+
+// The value of a parameter of a Content-Type (RFC 9110, 5.6.6). Blanks around "=" are tolerated.
+std::string parameter_of(std::string_view content_type, std::string_view name) {
+  std::size_t at = content_type.find(';');
+  while (at < content_type.size()) {
+    const std::size_t equals = content_type.find_first_of("=;", at + 1);
+    if (equals == content_type.npos || content_type[equals] == ';') {
+      at = equals;
+      continue;
+    }
+    const std::string_view found = trimmed(content_type.substr(at + 1, equals - at - 1));
+    std::string value;
+    at = content_type.find_first_not_of(" \t", equals + 1);
+    if (at != content_type.npos && content_type[at] == '"') {
+      for (++at; at < content_type.size() && content_type[at] != '"'; ++at) {
+        if (content_type[at] == '\\') ++at;
+        if (at < content_type.size()) value += content_type[at];
+      }
+      at = content_type.find(';', std::min(at, content_type.size()));
+    } else if (at != content_type.npos) {
+      const std::size_t end = std::min(content_type.find(';', at), content_type.size());
+      value = trimmed(content_type.substr(at, end - at));
+      at = end;
+    }
+    if (lower(found) == name) return value;
+  }
+  return "";
 }
 
 }  // namespace
 
 std::string boundary_of(std::string_view content_type) {
-  constexpr std::string_view kName = "boundary=";
-  const std::string low = lower(content_type);
-  const std::size_t at = low.find(kName);
-  std::string_view value = at == std::string::npos ? "" : content_type.substr(at + kName.size());
-  if (value.starts_with('"')) {
-    value.remove_prefix(1);
-    value = value.substr(0, value.find('"'));
-  } else {
-    value = trimmed(value.substr(0, value.find(';')));
+  const std::string type(trimmed(lower(content_type.substr(0, content_type.find(';')))));
+  const std::string boundary = parameter_of(content_type, "boundary");
+  const bool is_usable =
+      !boundary.empty() && boundary.size() <= kLongestBoundary && !has_control_characters(boundary);
+  if (type.starts_with("multipart/") && is_usable) return boundary;
+  if (type.starts_with("multipart/")) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "the response of the PACS has no usable boundary (Content-Type)");
   }
-  if (!low.starts_with("multipart/") || value.empty() || value.size() > kLongestBoundary ||
-      has_control_characters(value)) {
-    throw Error(ErrorCode::kSeriesIncomplete, "the response of the PACS is not multipart/related");
+  if (type.starts_with("application/") || type.starts_with("image/")) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "the PACS sends the series in another form than multipart/related (Content-Type)");
   }
-  return std::string(value);
+  // For example, a page of a proxy.
+  throw Error(ErrorCode::kSeriesIncomplete, "the response of the PACS is not multipart/related");
+}
+
+bool is_single_dicom(std::string_view content_type) {
+  return trimmed(lower(content_type.substr(0, content_type.find(';')))) == "application/dicom";
 }
 
 std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path& file,
@@ -128,9 +169,9 @@ std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path&
                                                     const std::filesystem::path& folder,
                                                     const MultipartLimits& limits) {
   Window window(file);
-  const std::string mark = "\r\n--" + boundary;
+  const std::string delimiter = "--" + boundary;
   // The first boundary has no preceding line break unless there is a preamble.
-  if (!take_until(window, mark.substr(2), [](std::string_view) {})) throw_cut();
+  if (!take_until(window, delimiter, [](std::string_view) {})) throw_cut();
   std::vector<std::filesystem::path> parts;
   std::uint64_t bytes = 0;
   while (!is_closing(window)) {
@@ -139,7 +180,7 @@ std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path&
                                             std::to_string(limits.max_parts) +
                                             " objects that are accepted");
     }
-    skip_head(window);
+    const std::string mark = skip_head(window) + delimiter;
     parts.push_back(folder / std::to_string(parts.size() + 1));
     const Descriptor target(
         ::open(parts.back().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));

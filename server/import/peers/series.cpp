@@ -12,6 +12,7 @@
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/import.h"
+#include "server/import/dicom/pixels/decode.h"
 #include "server/import/peers/multipart.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/scratch_folder.h"
@@ -60,6 +61,16 @@ dicom::DicomFile opened(const std::filesystem::path& part, std::size_t number,
   }
 }
 
+// A PACS sends images as it stores them if it may, and usually converts them otherwise.
+void check_readable(const dicom::DicomFile& file) {
+  const std::string& syntax = file.transfer_syntax();
+  if (!file.pixels() || !file.pixels()->is_encapsulated || dicom::can_decode(syntax)) return;
+  throw Error(ErrorCode::kUnusableVolume,
+              "the PACS sends the images in the transfer syntax " + in_quotes(syntax) +
+                  ", which is not supported: set transfer-syntax of this PACS to another one that "
+                  "it supports, such as \"1.2.840.10008.1.2.1\"");
+}
+
 // The files of the series' instances, without duplicates. Rejects missing instances, because half a
 // head is also a valid volume, and instances of several patients.
 std::vector<NamedFile> checked(const std::vector<std::filesystem::path>& parts,
@@ -76,6 +87,7 @@ std::vector<NamedFile> checked(const std::vector<std::filesystem::path>& parts,
                   "the PACS sent an object of another series than the requested one");
     }
     patients.add(data);
+    check_readable(file);
     if (instances.emplace(data.text(dicom::kSopInstanceUid)).second) {
       files.push_back(named_by_instance(parts[n], data));
     }
@@ -95,7 +107,9 @@ Volume read_peers_series(const ImportTask& task, const FormatListener& listener)
   const MultipartLimits limits = {.max_bytes = task.limits.max_sample_bytes + kHeadroomBytes,
                                   .max_parts = kMostInstances};
   const auto parts =
-      unpack_multipart(task.source, boundary_of(asked.content_type), folder.path(), limits);
+      is_single_dicom(asked.content_type)
+          ? std::vector{task.source}
+          : unpack_multipart(task.source, boundary_of(asked.content_type), folder.path(), limits);
   if (listener) listener("dicom");
   const std::vector<NamedFile> files = checked(parts, asked, task);
   try {

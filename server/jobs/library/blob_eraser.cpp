@@ -19,12 +19,15 @@ constexpr std::chrono::milliseconds kPause{100};
 
 // Without a mark, the blob of a process that dies goes to quarantine first, as any file without a
 // record does. A deletion does not fail for that, for instance on a full disk.
-void mark(const std::filesystem::path& folder, const std::string& key) {
+void mark(const std::filesystem::path& folder, std::span<const std::string> keys) {
+  if (keys.empty()) return;
   try {
-    if (!std::filesystem::exists(folder / key)) store::File::create(folder / key);
+    for (const std::string& key : keys) {
+      if (!std::filesystem::exists(folder / key)) store::File::create(folder / key);
+    }
     store::sync_folder(folder);
   } catch (const std::exception& error) {
-    log_warning("the deletion of a volume's samples could not be noted: {}", error.what());
+    log_warning("the deletion of files could not be noted: {}", error.what());
   }
 }
 
@@ -47,25 +50,33 @@ BlobEraser::BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volume
       waiting_(marked_in(marks_)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-void BlobEraser::erase(const std::string& key, const std::function<void()>& erase_record) {
-  {
-    const Lock lock(mutex_);
-    coming_.insert(key);
-  }
+void BlobEraser::erase(const std::function<void(const store::BlobsGoing& going)>& erase_records) {
+  std::vector<std::string> all;
+  const auto going = [&](std::span<const std::string> keys) {
+    note(keys);
+    all.insert(all.end(), keys.begin(), keys.end());
+    mark(marks_, keys);
+  };
   try {
-    mark(marks_, key);
-    erase_record();
+    erase_records(going);
   } catch (...) {
-    queue(key);
+    queue(all);
     throw;
   }
-  queue(key);
+  queue(all);
 }
 
-void BlobEraser::queue(const std::string& key) {
+void BlobEraser::note(std::span<const std::string> keys) {
   const Lock lock(mutex_);
-  coming_.erase(coming_.find(key));
-  waiting_.push_back(key);
+  coming_.insert(keys.begin(), keys.end());
+}
+
+void BlobEraser::queue(std::span<const std::string> keys) {
+  const Lock lock(mutex_);
+  for (const std::string& key : keys) {
+    coming_.erase(coming_.find(key));
+    waiting_.push_back(key);
+  }
   changed_.notify_all();
 }
 
@@ -108,7 +119,7 @@ bool BlobEraser::erase_now(const std::string& key) {
     blobs_.erase_unnamed(std::span(&key, 1), store::Steady(), names);
     return true;
   } catch (const std::exception& error) {
-    log_error("the samples of a deleted volume could not be erased and are removed later: {}",
+    log_error("a file of a deleted volume or job could not be erased and is removed later: {}",
               error.what());
     return false;
   }

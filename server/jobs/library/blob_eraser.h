@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <set>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -14,9 +15,9 @@
 
 namespace isomesh::jobs {
 
-// Erases the samples of deleted volumes in a thread of its own. So the response time of a deletion
-// reveals neither their size nor whether another owner still has them. What it did not get to
-// before the process ended, it erases after the next start. Thread safe.
+// Erases the files of deleted volumes and jobs in a thread of its own. So the response time of a
+// deletion reveals neither their size nor whether another owner still has them. What it did not get
+// to before the process ended, it erases after the next start. Thread safe.
 class BlobEraser {
  public:
   // `marks` is a folder with an empty file for each blob to erase. The other arguments must outlive
@@ -28,15 +29,16 @@ class BlobEraser {
   // database or the storage does not respond.
   ~BlobEraser() = default;
 
-  // Calls `erase_record` and then queues the blob, also if that throws. The blob is erased soon,
-  // unless a record names it by then.
-  void erase(const std::string& key, const std::function<void()>& erase_record);
+  // Calls `erase_records` and then queues the blobs that it says are going, also if that throws.
+  // Each is erased soon, unless a record names it by then.
+  void erase(const std::function<void(const store::BlobsGoing& going)>& erase_records);
 
   // Returns once all queued blobs are erased, or `stop` is requested.
   void finish(const std::stop_token& stop = {});
 
  private:
-  void queue(const std::string& key);
+  void note(std::span<const std::string> keys);
+  void queue(std::span<const std::string> keys);
   void run(const std::stop_token& stop);
   // Returns false if it failed.
   bool erase_now(const std::string& key);

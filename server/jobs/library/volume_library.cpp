@@ -96,7 +96,9 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
     });
   } catch (const Error& error) {
     // A remote store may have the bytes nevertheless.
-    if (error.code() == ErrorCode::kCancelled) eraser_.erase(blob.key, [] {});
+    if (error.code() == ErrorCode::kCancelled) {
+      eraser_.erase([&](const store::BlobsGoing& going) { going(std::span(&blob.key, 1)); });
+    }
     throw;
   }
   volume.samples = blob.key;
@@ -142,11 +144,15 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
   return volumes;
 }
 
-void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
-  const auto erase_record = [&] { volumes_.erase(viewer, id); };
-  const auto samples = volumes_.samples_of(viewer, id);
-  if (!samples) return erase_record();  // throws
-  eraser_.erase(*samples, erase_record);
+void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id, store::Made made) {
+  eraser_.erase([&](const store::BlobsGoing& going) { volumes_.erase(viewer, id, made, going); });
+}
+
+bool VolumeLibrary::erase_job(store::JobStore& jobs, const store::Viewer& viewer,
+                              const std::string& id) {
+  bool has_ended = false;
+  eraser_.erase([&](const store::BlobsGoing& going) { has_ended = jobs.erase(viewer, id, going); });
+  return has_ended;
 }
 
 }  // namespace isomesh::jobs

@@ -76,12 +76,18 @@ class VolumeLibrary {
   // Aborts running and waiting imports and the storing of their bytes, and rejects further ones.
   void stop_imports() { runner_.stop(); }
 
-  // Erases the records visible to the viewer. The samples are erased soon after the last record,
-  // or after the next start if this object is destroyed before.
-  // Throws Error kNotFound, kGone, and kNotReady while a job needs the volume.
-  void erase(const store::Viewer& viewer, const std::string& id);
+  // Erases the records visible to the viewer, and those of the ended jobs on them if `made` says
+  // so. Their files are erased soon after the last record that names them, or after the next start
+  // if this object is destroyed before. Throws Error kNotFound, kGone, and kNotReady while a job
+  // needs the volume.
+  void erase(const store::Viewer& viewer, const std::string& id,
+             store::Made made = store::Made::kKept);
 
-  // Returns once the samples of erased volumes are gone, or `stop` is requested.
+  // Erases the record of an ended job, and its files as above. Returns false, and changes nothing,
+  // if the job is queued or running. Throws Error kNotFound and kGone.
+  bool erase_job(store::JobStore& jobs, const store::Viewer& viewer, const std::string& id);
+
+  // Returns once the files of what was erased are gone, or `stop` is requested.
   void finish_erasing(const std::stop_token& stop = {}) { eraser_.finish(stop); }
 
  private:

@@ -27,7 +27,7 @@ double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
 
 // A certificate measures no more points of each surface if the limit is proven: what is found is
 // then only told beside it.
-inline constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 18;
+inline constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 16;
 
 // The formats that a certificate measures, in the files' order: each that rounds coordinates, and
 // the first of the exact ones, which all hold the mesh itself.

@@ -29,7 +29,7 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                           const MeshParameters& parameters, bool certify) {
   // From simplify.h, bound.h and triangle_grid.h, and a little more.
-  constexpr std::uint64_t kSimplifyBytesPerTriangle = 200;
+  constexpr std::uint64_t kSimplifyBytesPerTriangle = 220;
   constexpr std::uint64_t kProveBytesPerTriangle = 260;
   constexpr std::uint64_t kGridsPerTriangle = 130;
   std::uint64_t simplifying = 0;

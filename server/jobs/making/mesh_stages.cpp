@@ -49,7 +49,8 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
 }
 
-// False if the field proves nothing; then the mesh is unchanged.
+// False if the field proves nothing; then the mesh is unchanged, and the distance is checked
+// otherwise.
 bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
                            const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
@@ -58,11 +59,10 @@ bool simplify_within_error(const SampleArray& samples, const MeshRequest& reques
                                       .rounding_mm = quantisation_mm(parameters, mesh, most),
                                       .triangles = parameters.triangles.value_or(0),
                                       .is_smoothed = parameters.passes > 0};
-  std::string why_not;  // the distance is checked otherwise then
   const auto bound = with_sample(samples.type, [&](auto sample) {
     return mesh::simplify_within(lattice_of<decltype(sample)>(samples),
                                  extract_options(parameters, request.iso), options,
-                                 progress.context(), mesh, why_not);
+                                 progress.context(), mesh);
   });
   if (!bound) return false;
   summary.certificate.emplace().bound_mm = bound->bound_mm + quantisation_mm(parameters, mesh);
@@ -91,7 +91,8 @@ void simplify_checked(const MeshParameters& parameters, const ExtractedSurface& 
   if (effect.is_within) {
     certificate.bound_mm = parameters.max_error_mm;
   } else {
-    certificate.why_unproven = "Some points are farther than the limit after all attempts.";
+    certificate.why_unproven =
+        "Some points are farther than the limit, which could not be repaired.";
   }
 }
 

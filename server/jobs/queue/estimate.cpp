@@ -174,7 +174,7 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
 CostModel Estimator::model(const store::Viewer& viewer) const {
   CostModel costs;
   std::map<std::string, VolumeSize> sizes;
-  for (const Job& job : jobs_.list(viewer, JobState::kSucceeded, "", kJobsLookedAt)) {
+  for (const Job& job : jobs_.list(viewer, {.state = JobState::kSucceeded}, "", kJobsLookedAt)) {
     const std::string& id = job.parameters.volume;
     if (!volumes_.contains(viewer, id)) continue;
     const auto [known, is_new] = sizes.try_emplace(id);

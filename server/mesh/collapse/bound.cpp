@@ -158,42 +158,32 @@ double BoundedMesh::bound_at(std::span<const Vec3> places) const {
   return most + shift_mm;
 }
 
-bool has_bound(const ExtractOptions& options) { return !options.regularize; }
-
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
                                            const BoundOptions& options, const Context& context,
-                                           Mesh& mesh, std::string& why_not) {
+                                           Mesh& mesh) {
   using namespace collapse;
-  const auto unproven = [&](const char* why) {
-    why_not = why;
-    return std::optional<BoundedMesh>();
-  };
-  if (!has_bound(extract)) return unproven("There is no proof for such a surface.");
+  if (extract.regularize) return {};
   if (mesh.triangles.size() == 0) return BoundedMesh();
   const std::uint32_t margin =
       extract.close ? margin_for(Metric(lattice.to_space), options.max_error_mm) : 0;
   std::optional<Field> field = make_field(lattice, extract, margin, context);
-  if (!field) return unproven("Single precision cannot hold the samples' differences.");
+  if (!field) return {};  // single precision cannot hold the samples' differences
   Crossings crossings = crossings_of(*field, context);
   std::vector<std::uint8_t> turned;
   if (!mesh.kept.empty()) {
-    if (mesh.kept.size() != (crossings.all.size() + kFlagBits - 1) / kFlagBits) {
-      return unproven("The surface is not one of the samples.");
-    }
+    if (mesh.kept.size() != (crossings.all.size() + kFlagBits - 1) / kFlagBits) return {};
     turned = leave_out(mesh.kept, context, *field, crossings);
   }
-  if (crossings.all.size() != mesh.positions.size()) {
-    return unproven("The surface is not one of the samples.");
-  }
+  if (crossings.all.size() != mesh.positions.size()) return {};  // not a surface of the samples
   const Metric metric = Metric(lattice.to_space).before(margin);
   const double least = kLeastReach * options.max_error_mm;
   const double unmoved =
       options.max_error_mm - options.rounding_mm - rounding_of(field->dims, metric);
-  if (!(unmoved > least)) return unproven("Rounding of coordinates takes up the limit.");
+  if (!(unmoved > least)) return {};
   const double shift = shift_of(lattice, extract, *field, crossings.all, context);
   const double reach = unmoved - shift;
-  if (!(reach > least)) return unproven("Samples are too near to the iso-value for the limit.");
+  if (!(reach > least)) return {};  // samples are too near to the iso-value
 
   const StartSurface surface = {*field,
                                 crossings.all,
@@ -205,18 +195,17 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
                                 turned};
   std::optional<Tube> tube =
       make_start(surface, find_clusters(lattice, extract, *field, crossings, context), context);
-  if (!tube) return unproven("Samples differ too little from the iso-value.");
+  if (!tube) return {};  // samples differ too little from it
   const double unit = unit_mm(lattice.to_space);
   collapse_edges({*field, metric.in_units_of(unit), reach / unit}, options.triangles, context,
                  *tube);
-  if (!is_proven(surface, context, *tube)) return unproven("The final check failed.");
+  if (!is_proven(surface, context, *tube)) return {};
   return deliver(surface, *tube, shift, options.max_error_mm, mesh);
 }
 
-#define ISOMESH_INSTANTIATE(T, name, kType)                                                       \
-  template std::optional<BoundedMesh> simplify_within(const Lattice<T>&, const ExtractOptions&,   \
-                                                      const BoundOptions&, const Context&, Mesh&, \
-                                                      std::string&);
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                     \
+  template std::optional<BoundedMesh> simplify_within(const Lattice<T>&, const ExtractOptions&, \
+                                                      const BoundOptions&, const Context&, Mesh&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

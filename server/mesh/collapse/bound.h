@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "server/mesh/context.h"
@@ -45,9 +44,6 @@ struct BoundedMesh {
   double bound_at(std::span<const Vec3> places) const;
 };
 
-// True if simplify_within can prove a bound for such a surface: one that is not regularised.
-bool has_bound(const ExtractOptions& options);
-
 // Simplifies `mesh` in place, which extract_surface made of the lattice with these options, and
 // which may have lost components (Mesh::kept) and have been smoothed since, by less than the error.
 // Distances are those from the surface without these components. Its boundary stays on the faces
@@ -55,13 +51,13 @@ bool has_bound(const ExtractOptions& options);
 // its topology where components are larger than the error, and what Mesh says of layers. The same
 // mesh for any number of threads.
 //
-// Nothing where that cannot be proven, because single precision does not tell the samples apart or
-// parts of the surface are missing; then the mesh is as it was, and `why_not` says why in a
-// sentence for users. Beside the mesh it takes some 250 bytes a triangle and 4 bytes a sample, or 8
-// on the body-centred lattice. Throws Error kCancelled.
+// Nothing where that cannot be proven, because the surface was regularised, single precision does
+// not tell the samples apart or parts of the surface are missing; then the mesh is as it was.
+// Beside the mesh it takes some 250 bytes a triangle and 4 bytes a sample, or 8 on the body-centred
+// lattice. Throws Error kCancelled.
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
                                            const BoundOptions& options, const Context& context,
-                                           Mesh& mesh, std::string& why_not);
+                                           Mesh& mesh);
 
 }  // namespace isomesh::mesh

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "server/mesh/collapse/history.h"
 #include "server/mesh/collapse/misses.h"
 #include "server/mesh/measure/point_triangle.h"
 
@@ -16,32 +17,32 @@ namespace isomesh::mesh::collapse {
 // numbers. Takes some 14 bytes a triangle. Thread safe for different triangles.
 class KeptPoints {
  public:
-  // `grids`: of the original; must outlive it. `shares`: as SimplifyOptions.
+  // `grids`: of the original; must outlive it, as `history` must, which is told of collapses.
   KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm,
-             std::span<const float> shares);
+             History& history);
 
+  // A triangle with a new first corner. The edge to its second one may be new, and with
+  // `is_third_new` that to its third; the others were near before.
   struct Shape {
     std::uint32_t triangle = 0;
     mesh::Corners corners;
+    bool is_third_new = false;
   };
 
-  // True if these shapes may come instead of the triangles of the `star`, some of which they are.
-  // If so, the points of these are theirs, each one's of its own wall.
-  bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes);
+  // True if the collapse may replace the triangles of the `star` by these shapes, some of them. If
+  // so, the points of these are theirs, each one's of its own wall.
+  bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes,
+               const Collapse& collapse);
 
  private:
-  // The squared distance that a point may have.
-  double limit_of(std::uint32_t point) const {
-    return shares_.empty() ? squared_mm_ : squared_mm_ * shares_[point] * shares_[point];
-  }
   bool is_near(const Shape& shape) const;
   std::uint32_t home_of(std::uint32_t point, std::uint32_t triangle,
                         std::span<const Shape> shapes) const;
 
   const WalledSurface original_;
   const WallGrids& grids_;
-  const double squared_mm_;
-  std::vector<float> shares_;         // of each point; none if all are 1
+  const double squared_mm_;  // that a point may have
+  History& history_;
   std::vector<std::uint32_t> first_;  // of each triangle
   std::vector<std::uint32_t> next_;   // of each point, of the same triangle
 };

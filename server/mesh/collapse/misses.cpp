@@ -99,7 +99,7 @@ class Searcher {
     const Corners corners = corners_of(from_.view, triangle);
     const std::size_t wall = to_.find(from_.sides_of(triangle));
     if (wall == WallGrids::kNone) {
-      return Miss{triangle, centre_of(corners), box_of(from_.view, from_.view.triangles[triangle])};
+      return Miss{triangle, centre_of(corners)};
     }
     grid_ = &to_.grid(wall);
     guess_ = guesses_[wall];
@@ -107,8 +107,7 @@ class Searcher {
     const bool is_all_near = is_near(Piece(corners), 0);
     guesses_[wall] = guess_;
     if (is_all_near) return {};
-    const SurfaceView& others = grid_->surface();
-    return Miss{triangle, place_, box_of(others, others.triangles[nearest_])};
+    return Miss{triangle, place_};
   }
 
  private:
@@ -129,7 +128,6 @@ class Searcher {
     if (distance + radius <= within_ || is_near_guess(piece)) return true;
     if (distance >= farthest_mm_) {
       farthest_mm_ = distance;
-      nearest_ = nearest.triangle;
       place_ = centre;
     }
     if (!(distance <= within_) || radius < kSmallest * within_ || cuts == kMostCuts) return false;
@@ -179,7 +177,6 @@ class Searcher {
   const TriangleGrid* grid_ = nullptr;
   std::uint32_t guess_ = TriangleGrid::kNone;
   double farthest_mm_ = 0;
-  std::uint32_t nearest_ = 0;  // to the place
   Point place_ = {0, 0, 0};
 };
 

@@ -17,7 +17,6 @@
 
 #include "server/mesh/context.h"
 #include "server/mesh/labels/separate.h"
-#include "server/mesh/measure/marked_cubes.h"
 #include "server/mesh/measure/triangle_grid.h"
 
 namespace isomesh::mesh {
@@ -60,7 +59,6 @@ class WallGrids {
 struct Miss {
   std::uint32_t triangle = 0;
   Point place = {0, 0, 0};  // in it: the farthest that was found
-  Box near;                 // around the triangle that is nearest to it
 };
 
 // The misses among the triangles `which` of `from`, in their order: those with a place that is

@@ -85,8 +85,8 @@ Cubes cut_cubes(std::span<const Triangle> triangles,
 
 }  // namespace
 
-std::size_t Patches::collapse(const CubeCut& cut, const Context& context,
-                              const std::function<void(Patch&)>& collapse) {
+void Patches::collapse(const CubeCut& cut, const Context& context,
+                       const std::function<void(Patch&)>& collapse) {
   const Context quiet = {context.stop, nullptr};
   const Cubes cubes = cut_cubes(triangles_, place_, Cutter(size_, cut), quiet);
   std::vector<Result> results(cubes.size());
@@ -113,9 +113,6 @@ std::size_t Patches::collapse(const CubeCut& cut, const Context& context,
     }
   });
   take(results, quiet);
-  std::size_t count = 0;
-  for (std::size_t cube = 0; cube + 1 < cubes.size(); ++cube) count += !cubes.of(cube).empty();
-  return count;
 }
 
 Patch Patches::patch_of(std::span<const std::uint32_t> members, bool is_for_seams) const {

@@ -51,10 +51,10 @@ class Patches {
 
   // Calls collapse(patch) for each cube, several at once. It leaves fewer triangles, with their
   // numbers, and sets `stays` for the vertices that others may have too. For seams, the vertices
-  // to begin with are those that stayed before and their neighbours. Returns how many cubes there
-  // were. Does not depend on the number of threads. Throws Error kCancelled.
-  std::size_t collapse(const CubeCut& cut, const Context& context,
-                       const std::function<void(Patch&)>& collapse);
+  // to begin with are those that stayed before and their neighbours. Does not depend on the number
+  // of threads. Throws Error kCancelled.
+  void collapse(const CubeCut& cut, const Context& context,
+                const std::function<void(Patch&)>& collapse);
 
  private:
   struct Result {

@@ -1,8 +1,10 @@
 // One attempt to simplify a surface; private to this folder.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
+#include "server/mesh/collapse/history.h"
 #include "server/mesh/collapse/misses.h"
 #include "server/mesh/collapse/simplify.h"
 #include "server/mesh/context.h"
@@ -11,11 +13,12 @@
 
 namespace isomesh::mesh {
 
-// A simplified surface: triangles between its vertices, and their sides if it has walls.
+// A simplified surface.
 struct Proposal {
   SimplificationEffect effect;
   std::vector<Triangle> triangles;
-  std::vector<WallSides> sides;
+  std::vector<std::uint32_t> numbers;  // of each: that of the original triangle that became it
+  collapse::History history;           // if distances were measured
 };
 
 // The surface that the error is measured from.

@@ -22,6 +22,9 @@ using collapse::Patch;
 using collapse::Vecd;
 using collapse::Vecf;
 
+// The share of the error that measured points may use. With less, there are more triangles; with
+// more, more of them are beyond the error between the points.
+constexpr double kMeasuredShare = 0.95;
 constexpr int kMostRounds = 12;
 // The share of the triangles that a round leaves at least. Seams stay in a round, so triangles
 // beside them would become much smaller than the others.
@@ -59,11 +62,13 @@ class Simplifier {
             [this](std::uint32_t v) { return place_of(v); }, scaled(extent_.high)) {
     std::iota(numbers_.begin(), numbers_.end(), 0U);
     if (original == nullptr) return;
-    points_.emplace(original->surface, original->grids, options.max_error_mm, options.shares);
+    history_ = collapse::History(mesh.positions.size());
+    points_.emplace(original->surface, original->grids, kMeasuredShare * options.max_error_mm,
+                    history_);
     around_.points = &*points_;
   }
 
-  SimplificationEffect run() {
+  Proposal run() {
     effect_.triangles_before = triangles_.size();
     if (options_.triangles == 0) {
       reduce_within_error();
@@ -71,16 +76,7 @@ class Simplifier {
       reduce_to_number();
     }
     effect_.triangles_after = triangles_.size();
-    return effect_;
-  }
-
-  // The remaining triangles, and their sides.
-  std::vector<Triangle>& triangles() { return triangles_; }
-  std::vector<WallSides> sides() const {
-    std::vector<WallSides> sides;
-    if (sides_.empty()) return sides;
-    for (const std::uint32_t number : numbers_) sides.push_back(sides_[number]);
-    return sides;
+    return {effect_, std::move(triangles_), std::move(numbers_), std::move(history_)};
   }
 
  private:
@@ -157,6 +153,7 @@ class Simplifier {
   void reduce_lines(const CubeCut& cut, double share) {
     if (sides_.empty()) return;
     const std::vector<std::uint32_t> degrees = count_triangles();
+    begin_pass();
     patches_.collapse(cut, quiet_, [&](Patch& patch) {
       set_stays(degrees, patch);
       simplify_lines(around_, sides_, share, patch);
@@ -165,7 +162,8 @@ class Simplifier {
 
   void reduce(const CubeCut& cut, const Context& context, double share) {
     const std::vector<std::uint32_t> degrees = count_triangles();
-    effect_.blocks += patches_.collapse(cut, context, [&](Patch& patch) {
+    begin_pass();
+    patches_.collapse(cut, context, [&](Patch& patch) {
       set_stays(degrees, patch);
       hold_lines(patch);
       const double least = share * static_cast<double>(patch.triangles.size());
@@ -174,10 +172,16 @@ class Simplifier {
   }
 
   void reduce_whole(std::size_t least) {
+    begin_pass();
     patches_.collapse(kWhole, quiet_, [&](Patch& patch) {
       hold_lines(patch);
       simplify_patch(around_, least, around_.points == nullptr, patch);
     });
+  }
+
+  // Each collapse takes a triangle away at least, so its step is more than those of earlier passes.
+  void begin_pass() {
+    around_.step = static_cast<std::uint32_t>(effect_.triangles_before - triangles_.size());
   }
 
   // How many triangles each vertex has.
@@ -189,28 +193,21 @@ class Simplifier {
     return degrees;
   }
 
-  // Vertices that are held or have triangles elsewhere stay.
+  // Vertices that have triangles elsewhere stay.
   void set_stays(std::span<const std::uint32_t> degrees, Patch& patch) const {
     std::vector<std::uint32_t> found(patch.names.size(), 0);
     for (const Triangle& triangle : patch.triangles) {
       for (const std::uint32_t vertex : triangle) ++found[vertex];
     }
     for (std::size_t v = 0; v < found.size(); ++v) {
-      const std::uint32_t name = patch.names[v];
-      if (found[v] != degrees[name]) patch.stays[v] |= collapse::kIsElsewhere;
-      if (is_held(name)) patch.stays[v] |= collapse::kStays;
+      if (found[v] != degrees[patch.names[v]]) patch.stays[v] |= collapse::kIsElsewhere;
     }
   }
 
   void hold_lines(Patch& patch) const {
     for (std::size_t v = 0; v < patch.names.size(); ++v) {
-      const std::uint32_t name = patch.names[v];
-      if (mesh_.is_on_line(name) || is_held(name)) patch.stays[v] |= collapse::kStays;
+      if (mesh_.is_on_line(patch.names[v])) patch.stays[v] |= collapse::kStays;
     }
-  }
-
-  bool is_held(std::uint32_t vertex) const {
-    return !options_.shares.empty() && options_.shares[vertex] == 0;
   }
 
   const SimplifyOptions& options_;
@@ -221,6 +218,7 @@ class Simplifier {
   const Extent extent_;
   std::vector<Triangle> triangles_;
   std::vector<std::uint32_t> numbers_;  // of each triangle: one of the mesh that became it
+  collapse::History history_;
   std::optional<collapse::KeptPoints> points_;
   collapse::SimplifySurroundings around_;
   collapse::Patches patches_;
@@ -231,9 +229,7 @@ class Simplifier {
 
 Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
                  const SeparatingSurface* walls, const Original* original) {
-  Simplifier simplifier(options, context, mesh, walls, original);
-  const SimplificationEffect effect = simplifier.run();
-  return {effect, std::move(simplifier.triangles()), simplifier.sides()};
+  return Simplifier(options, context, mesh, walls, original).run();
 }
 
 }  // namespace isomesh::mesh

@@ -27,15 +27,11 @@ struct SimplifyOptions {
   std::span<const Vec3> before = {};
   // Target triangle count. 0: as few as the error allows.
   std::uint64_t triangles = 0;
-  // The share of the error that simplification may use near each vertex of the mesh. With 0 the
-  // vertex stays, on junction curves too. Empty: as large for all as serves best.
-  std::span<const float> shares = {};
 };
 
 struct SimplificationEffect {
   std::uint64_t triangles_before = 0;
   std::uint64_t triangles_after = 0;
-  std::uint64_t blocks = 0;  // of triangles that were simplified together, in all rounds
   // True if the target count was reached, or if there was none.
   bool reached_triangles = true;
   // True if the target was not reached because no further edge can collapse, whatever the error.

@@ -173,9 +173,12 @@ class LineSimplifier {
     for (const std::uint32_t t : gone) star.push_back(patch_.numbers[t]);
     for (const std::uint32_t t : kept) {
       star.push_back(patch_.numbers[t]);
-      shapes.push_back({star.back(), corners_of(moved(t, v, into))});
+      Triangle corners = moved(t, v, into);
+      std::rotate(corners.begin(), std::ranges::find(corners, into), corners.end());
+      shapes.push_back({star.back(), corners_of(corners), true});
     }
-    return around_.points->replace(star, shapes);
+    const Collapse step = {patch_.names[v], patch_.names[into], around_.step + collapses_};
+    return around_.points->replace(star, shapes, step);
   }
 
   // The triangles around a vertex that a collapse takes away, and those that it leaves.
@@ -249,6 +252,7 @@ class LineSimplifier {
 
   void move(std::uint32_t v, std::uint32_t into, std::uint32_t beyond, const Numbers& gone,
             const Numbers& kept) {
+    ++collapses_;
     for (const std::uint32_t t : gone) {
       is_gone_[t] = true;
       for (const std::uint32_t vertex : patch_.triangles[t]) std::erase(around_vertex_[vertex], t);
@@ -305,6 +309,7 @@ class LineSimplifier {
   std::vector<Numbers> on_line_beside_;  // of each vertex its neighbours along lines
   std::vector<bool> is_at_end_;          // whether a surface ends at the vertex
   std::vector<bool> is_free_;
+  std::uint32_t collapses_ = 0;
   std::map<Edge, Numbers> passed_;      // vertices that an edge of a line stands for
   std::vector<std::uint32_t> version_;  // of a vertex; a candidate of another one is out of date
   std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> queue_;

@@ -85,7 +85,9 @@ class Simplifier : private Collapser<Simplifier> {
       if (!is_upright(at(a), corners)) return false;
       shapes_.push_back({star_.back(), corners});
     }
-    if (around_.points != nullptr && !around_.points->replace(star_, shapes_)) return false;
+    const Collapse step = {patch_.names[a], patch_.names[b], around_.step + collapses_};
+    if (around_.points != nullptr && !around_.points->replace(star_, shapes_, step)) return false;
+    ++collapses_;
     const Quadric& of_b = nodes_[b].quadric;
     finish(a, k, bucket, nodes_[a].quadric + of_b.about(way(b, a)), nodes_[b].place);
     return true;
@@ -108,6 +110,7 @@ class Simplifier : private Collapser<Simplifier> {
   const float most_;  // as a squared distance
   bool may_turn_ = false;
   std::size_t tries_ = 0;
+  std::uint32_t collapses_ = 0;
   std::vector<std::uint32_t> star_;
   std::vector<KeptPoints::Shape> shapes_;
 };

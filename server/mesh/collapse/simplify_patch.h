@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "server/mesh/collapse/kept_points.h"
 #include "server/mesh/collapse/patches.h"
@@ -17,6 +18,7 @@ struct SimplifySurroundings {
   double unit_mm = 1;            // near the length of edges: quadrics have single precision
   KeptPoints* points = nullptr;  // none if nothing is measured
   double max_error_mm = 0;       // of the points
+  std::uint32_t step = 0;        // of the first collapse (history.h)
 };
 
 // Draws vertices into neighbours until `least` triangles are left. Those that stay or have not one

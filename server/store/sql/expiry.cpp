@@ -38,6 +38,23 @@ std::vector<Blob> read_blobs(Rows rows) {
   return blobs;
 }
 
+void erase_jobs(SqlConnection& connection, std::span<const std::string> jobs,
+                const BlobsGoing& going) {
+  std::vector<std::string> keys;
+  for (const std::string& job : jobs) {
+    for (const Blob& blob :
+         read_blobs(connection.query("SELECT blob, bytes FROM meshes WHERE job = ?1", job))) {
+      keys.push_back(blob.key);
+    }
+  }
+  if (going) going(keys);
+  for (const std::string& job : jobs) {
+    connection.run("DELETE FROM jobs WHERE id = ?1", job);
+    connection.run("DELETE FROM events WHERE job = ?1", job);
+    connection.run("DELETE FROM callbacks WHERE job = ?1", job);
+  }
+}
+
 std::uint64_t sum_of_blobs(SqlDatabase& database, const std::string& table,
                            const std::string& key) {
   Rows row =

@@ -19,6 +19,11 @@ std::vector<Expirable> read_expirable(const SqlDatabase& database, RecordKind ki
 // From rows of key and bytes.
 std::vector<Blob> read_blobs(Rows rows);
 
+// Erases ended jobs, with their events and their undelivered callbacks, for good: their ids are not
+// remembered. The caller has locked their rows.
+void erase_jobs(SqlConnection& connection, std::span<const std::string> jobs,
+                const BlobsGoing& going);
+
 // Total size of the blobs that column `key` of the table names; each counts once.
 std::uint64_t sum_of_blobs(SqlDatabase& database, const std::string& table, const std::string& key);
 

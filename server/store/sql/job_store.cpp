@@ -26,6 +26,16 @@ std::int64_t turn_cost_us(double expected_ms) {
   return std::llround(bounded * 1000);
 }
 
+std::optional<std::int64_t> us_of(const SqlDatabase& database, const std::optional<Time>& time) {
+  return time ? std::optional(database.to_us(*time)) : std::nullopt;
+}
+
+[[noreturn]] void throw_missing_job(SqlConnection& connection, const Viewer& viewer,
+                                    const std::string& id) {
+  if (has_expired(connection, viewer, id)) throw Error(ErrorCode::kGone, "the job has expired");
+  throw Error(ErrorCode::kNotFound, "there is no job with this id");
+}
+
 }  // namespace
 
 // --- Queries
@@ -53,14 +63,16 @@ JobAccount SqlJobStore::account(const std::string& id) const {
   });
 }
 
-std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState> state,
+std::vector<Job> SqlJobStore::list(const Viewer& viewer, const JobFilter& filter,
                                    const std::string& after, std::size_t limit) const {
-  return list_despite_damage([&] { return list_after(viewer, state, after, limit); },
-                             [&] { return undamaged_after(viewer, state, after, limit); });
+  return list_despite_damage([&] { return list_after(viewer, filter, after, limit); },
+                             [&] { return undamaged_after(viewer, filter, after, limit); });
 }
 
-std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, std::optional<JobState> state,
+std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, const JobFilter& filter,
                                          const std::string& after, std::size_t limit) const {
+  const auto since = us_of(records_, filter.since);
+  const auto until = us_of(records_, filter.until);
   std::vector<Job> jobs;
   std::string last = after;
   // Repeats only if damaged records were skipped, because fewer than `limit` jobs mean the end of
@@ -69,10 +81,13 @@ std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, std::optional<Job
     // Conditions that are absent from the text let the query use an index.
     std::size_t left = std::min<std::size_t>(limit - jobs.size(), 1 << 30);
     Rows rows = records_.query(select_ + "WHERE " + (viewer ? "j.owner = ?1" : "?1 IS NULL") +
-                                   (state ? " AND j.state = ?2" : " AND ?2 IS NULL") +
+                                   (filter.state ? " AND j.state = ?2" : " AND ?2 IS NULL") +
                                    (last.empty() ? " AND ?3 = ''" : " AND j.id < ?3") +
+                                   (filter.volume ? " AND j.volume = ?5" : " AND ?5 IS NULL") +
+                                   (since ? " AND j.accepted >= ?6" : " AND ?6 IS NULL") +
+                                   (until ? " AND j.accepted < ?7" : " AND ?7 IS NULL") +
                                    " ORDER BY j.id DESC LIMIT ?4",
-                               viewer, state, last, left);
+                               viewer, filter.state, last, left, filter.volume, since, until);
     for (; rows.next(); --left) {
       const Row row = row_of(rows);
       last = row.job.id;
@@ -83,7 +98,7 @@ std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, std::optional<Job
   return jobs;
 }
 
-std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, std::optional<JobState> state,
+std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, const JobFilter& filter,
                                               const std::string& after, std::size_t limit) const {
   std::map<std::string, Row> found;
   const auto take = [&](const Rows& rows) {
@@ -94,8 +109,10 @@ std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, std::optiona
   read_undamaged(records_, kJobs,
                  select_ +
                      "WHERE (?1 IS NULL OR j.owner = ?1) AND (?2 IS NULL OR j.state = ?2) AND (?3 "
-                     "= '' OR j.id < ?3)",
-                 take, viewer, state, after);
+                     "= '' OR j.id < ?3) AND (?4 IS NULL OR j.volume = ?4) AND (?5 IS NULL OR "
+                     "j.accepted >= ?5) AND (?6 IS NULL OR j.accepted < ?6)",
+                 take, viewer, filter.state, after, filter.volume, us_of(records_, filter.since),
+                 us_of(records_, filter.until));
   std::vector<Job> jobs;
   for (const auto& [id, row] : found) jobs.push_back(with_progress(row));
   std::ranges::reverse(jobs);
@@ -149,8 +166,7 @@ std::optional<SqlJobStore::Row> SqlJobStore::find(SqlConnection& connection, con
 SqlJobStore::Row SqlJobStore::found(SqlConnection& connection, const Viewer& viewer,
                                     const std::string& id) const {
   if (auto row = find(connection, viewer, id)) return *std::move(row);
-  if (has_expired(connection, viewer, id)) throw Error(ErrorCode::kGone, "the job has expired");
-  throw Error(ErrorCode::kNotFound, "there is no job with this id");
+  throw_missing_job(connection, viewer, id);
 }
 
 SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns, bool is_newer) {
@@ -372,7 +388,27 @@ void SqlJobStore::close() {
   wake_all_workers();
 }
 
-// --- Expiry and statistics of ended jobs
+// --- Erasure, expiry and statistics of ended jobs
+
+bool SqlJobStore::erase(const Viewer& viewer, const std::string& id, const BlobsGoing& going) {
+  return records_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    // Does not read the record, so that damaged ones can be erased too.
+    const auto state = [&]() -> std::optional<JobState> {
+      Rows row = connection.query(
+          std::string("SELECT state FROM jobs WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)") +
+              connection.for_update(),
+          id, viewer);
+      return row.next() ? std::optional(row.choice(0, JobState::kCancelled)) : std::nullopt;
+    }();
+    if (!state && transaction.is_again()) return true;
+    if (!state) throw_missing_job(connection, viewer, id);
+    if (!is_final(*state)) return false;
+    erase_jobs(connection, std::span(&id, 1), going);
+    transaction.commit();
+    return true;
+  });
+}
 
 std::vector<Expirable> SqlJobStore::ended(const ExpiryFilter& filter, Ended which,
                                           std::size_t limit) const {

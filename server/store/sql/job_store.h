@@ -22,10 +22,11 @@ class SqlJobStore : public JobStore {
   Submission submit(const JobSpec& spec) override;
   Job remake(const std::string& id) override;
   bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) override;
+  bool erase(const Viewer& viewer, const std::string& id, const BlobsGoing& going) override;
   Job get(const Viewer& viewer, const std::string& id) const override;
   JobAccount account(const std::string& id) const override;
-  std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
-                        const std::string& after, std::size_t limit) const override;
+  std::vector<Job> list(const Viewer& viewer, const JobFilter& filter, const std::string& after,
+                        std::size_t limit) const override;
   QueueDepth depth(const Viewer& viewer) const override;
   bool is_full() const override;
   void refuse_new() override { refusing_ = true; }
@@ -138,10 +139,10 @@ class SqlJobStore : public JobStore {
   std::map<std::string, Live> live_ ISOMESH_GUARDED_BY(live_mutex_);  // of running jobs
 
  private:
-  std::vector<Job> list_after(const Viewer& viewer, std::optional<JobState> state,
+  std::vector<Job> list_after(const Viewer& viewer, const JobFilter& filter,
                               const std::string& after, std::size_t limit) const;
   // The same from a table with damaged pages.
-  std::vector<Job> undamaged_after(const Viewer& viewer, std::optional<JobState> state,
+  std::vector<Job> undamaged_after(const Viewer& viewer, const JobFilter& filter,
                                    const std::string& after, std::size_t limit) const;
   // True if the job failed because of a damaged volume that is intact now.
   bool is_repaired(const Job& job) const;

@@ -45,6 +45,7 @@ std::vector<Schema> with_service(std::string tables, std::vector<Schema> compone
   Schema service;
   service.component = "service";
   service.steps.push_back(std::move(tables));
+  service.steps.emplace_back("CREATE INDEX jobs_of_volume ON jobs(owner, volume, id)");
   service.named_blobs =
       "SELECT blob, 'the volume ' AS what, id AS name FROM volumes UNION ALL "
       "SELECT blob, 'a mesh of the job ', job FROM meshes";

@@ -63,6 +63,22 @@ void throw_if_needed(SqlConnection& connection, const Viewer& viewer, const std:
   if (needed.next()) throw Error(ErrorCode::kNotReady, "unfinished jobs need this volume");
 }
 
+std::vector<std::string> texts_in(Rows rows) {
+  std::vector<std::string> texts;
+  while (rows.next()) texts.push_back(rows.text(0));
+  return texts;
+}
+
+void erase_jobs_on(SqlConnection& connection, const Viewer& viewer, const std::string& id,
+                   const BlobsGoing& going) {
+  const std::string mine = viewer ? "owner = ?2" : "?2 IS NULL";
+  const std::vector<std::string> jobs =
+      texts_in(connection.query("SELECT id FROM jobs WHERE volume = ?1 AND " + mine +
+                                    " AND state >= {job.final}" + connection.for_update(),
+                                id, viewer));
+  erase_jobs(connection, jobs, going);
+}
+
 // The owner's existing record; sets its time of last use.
 std::optional<Volume> use(SqlConnection& connection, const std::string& owner,
                           const std::string& id) {
@@ -214,22 +230,23 @@ std::vector<Volume> SqlVolumeStore::undamaged_after(const VolumePlace& place, co
 }
 
 // Locks the rows before checking for jobs, so that no job is submitted in between.
-void SqlVolumeStore::erase(const Viewer& viewer, const std::string& id) {
+void SqlVolumeStore::erase(const Viewer& viewer, const std::string& id, Made made,
+                           const BlobsGoing& going) {
   database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
-    // Checks existence only, so that damaged records can be erased too.
-    const bool is_there =
-        connection
-            .query(std::string("SELECT 1 FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = "
-                               "?2)") +
-                       connection.for_update(),
-                   id, viewer)
-            .next();
-    if (!is_there) {
+    // Does not read the records, so that damaged ones can be erased too.
+    const std::vector<std::string> samples = texts_in(
+        connection.query(std::string("SELECT blob FROM volumes WHERE id = ?1 AND (?2 IS NULL OR "
+                                     "owner = ?2)") +
+                             connection.for_update(),
+                         id, viewer));
+    if (samples.empty()) {
       if (transaction.is_again()) return;
       throw_missing(connection, viewer, id);
     }
     throw_if_needed(connection, viewer, id);
+    if (going) going(samples);
+    if (made == Made::kErased) erase_jobs_on(connection, viewer, id, going);
     connection.run("DELETE FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id, viewer);
     transaction.commit();
   });

@@ -39,7 +39,8 @@ class SqlVolumeStore : public VolumeStore {
   std::string key() const override;
   std::vector<Volume> list(const Viewer& viewer, const std::string& after, std::size_t limit,
                            ListOrder order) const override;
-  void erase(const Viewer& viewer, const std::string& id) override;
+  void erase(const Viewer& viewer, const std::string& id, Made made,
+             const BlobsGoing& going) override;
   bool names(const std::string& blob) const override;
   std::vector<Expirable> unused(const ExpiryFilter& filter, std::size_t limit) const override;
   Expired expire(std::span<const Expirable> volumes, std::uint64_t enough) override;

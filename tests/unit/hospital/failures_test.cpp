@@ -185,6 +185,43 @@ TEST_F(OrdersTest, ThatFindTheObjectOfAnotherOneHaveNoTransferOfIt) {
   EXPECT_EQ(main_->stores, 1);
 }
 
+// A PACS may know an object before it lists it.
+TEST_F(OrdersTest, SearchAgainForAnObjectThatIsNotListedYet) {
+  main_->is_unlisted = true;
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return main_->stores == 1; }));
+  for (int look = 0; look < 5; ++look) {
+    const int before = main_->calls;
+    pass(seconds(1 << look));
+    ASSERT_TRUE(until([&] { return main_->calls > before; })) << look;
+  }
+  stop();  // another process goes on with it
+  begin();
+  main_->is_unlisted = false;
+  pass(seconds(32));
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(get(id).attempts, 0U);
+  EXPECT_EQ(main_->stores, 1);
+  EXPECT_THAT(outcomes_of("110104", id), ElementsAre("success", "success")) << "in, out";
+}
+
+TEST_F(OrdersTest, SendAnObjectAgainThatIsNeverListed) {
+  main_->is_unlisted = true;
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return main_->stores == 1; }));
+  for (std::uint32_t attempts = 1; attempts <= 2; ++attempts) {
+    ASSERT_TRUE(until([&] {
+      pass(minutes(1));
+      return get(id).attempts >= attempts;
+    }));
+  }
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("does not find it"));
+  EXPECT_EQ(get(id).state, OrderState::kSending);
+  EXPECT_GE(main_->stores, 2);
+}
+
 // Sixty hours, of which nothing is waited for.
 TEST_F(OrdersTest, OutliveAWeekendsOutage) {
   main_->is_down = true;

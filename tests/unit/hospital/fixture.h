@@ -102,12 +102,13 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::atomic<int> fetches = 0;
   std::atomic<int> sent_slices = kSlices;     // of those that it lists
   std::atomic<int> foreign_slice = -1;        // of another patient
+  std::atomic<bool> is_unlisted = false;      // it does not find what it stored
   std::atomic<bool> is_merged = false;        // the study has another Patient ID than its images
   std::function<void()> after_store = [] {};  // set it before there are orders
   std::function<void()> on_fetched;           // called when the images have come
 
-  std::vector<FoundSeries> find_recent(const std::string&, const std::string&,
-                                       const std::stop_token&) override {
+  RecentSeries find_recent(const std::string&, const std::string&,
+                           const std::stop_token&) override {
     return {};
   }
   std::optional<FoundSeries> find_series(const std::string&, const std::string& series,
@@ -150,7 +151,7 @@ class FakePacs : public Archive, public ObjectReceiver {
   bool has_instance(const InstancePlace& place, const std::stop_token& stop) override {
     answer(stop);
     const Lock lock(mutex_);
-    return stored_.contains(place.instance);
+    return !is_unlisted && stored_.contains(place.instance);
   }
   void store(const OutgoingObject& object, const std::stop_token& stop) override {
     answer(stop);

@@ -46,6 +46,16 @@ TEST_F(Multipart, IsUnpacked) {
   EXPECT_THAT(parts_of("--b \r\n\r\n\r\n--b--"), ElementsAre(""));
 }
 
+TEST_F(Multipart, IsUnpackedThoughLinesEndWithLineFeedsAlone) {
+  EXPECT_THAT(parts_of("preamble\n--b\nX: y\n\none\r\n--b\n\ntwo\n\n--b--\n"),
+              ElementsAre("one\r", "two\n"));
+  EXPECT_THAT(parts_of("--b\n\none\n--b--"), ElementsAre("one"));
+  const std::string whole = "--b\nX: y\n\none\n--b\n\ntwo\n--b--";
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    EXPECT_EQ(refusal_of(whole.substr(0, length)), ErrorCode::kSeriesIncomplete) << length;
+  }
+}
+
 // Whatever is missing at its end, nothing is taken for the whole.
 TEST_F(Multipart, CutAnywhereIsRefused) {
   const std::size_t closed = whole_.find("--b--") + 5;
@@ -78,13 +88,24 @@ TEST_F(Multipart, IsBounded) {
 TEST(Boundary, IsThatOfTheContentType) {
   EXPECT_EQ(boundary_of("multipart/related; type=\"application/dicom\"; boundary=a-b"), "a-b");
   EXPECT_EQ(boundary_of("Multipart/Related; Boundary=\"a; b\"; type=x"), "a; b");
-  for (const std::string& type :
-       {std::string(), std::string("application/dicom"), std::string("multipart/related"),
-        std::string("text/plain; boundary=b"), std::string("multipart/related; boundary="),
-        "multipart/related; boundary=" + std::string(71, 'b')}) {
+  EXPECT_EQ(boundary_of("multipart/related; boundary = a ; type=x"), "a");
+  EXPECT_EQ(boundary_of("multipart/related;boundary\t=\t\"a b\""), "a b");
+  EXPECT_EQ(boundary_of(R"(multipart/related; type="x; boundary=y"; boundary="a\"b")"), "a\"b");
+  EXPECT_EQ(boundary_of("multipart/related; x-boundary=1; y; boundary=2;"), "2");
+  const std::string long_one = "multipart/related; boundary=" + std::string(71, 'b');
+  // The PACS will not send anything else, so no retry helps.
+  for (const std::string type :
+       {"multipart/related", "multipart/related; boundary=", "multipart/related; boundary",
+        "multipart/related; boundary=\"\"", "multipart/related; boundary =", "application/zip",
+        "application/dicom+json", "image/jpeg", long_one.c_str()}) {
+    EXPECT_EQ(test::code_thrown_by([&] { boundary_of(type); }), ErrorCode::kUnusableVolume) << type;
+  }
+  for (const std::string type : {"", "text/plain; boundary=b", "text/html"}) {
     EXPECT_EQ(test::code_thrown_by([&] { boundary_of(type); }), ErrorCode::kSeriesIncomplete)
         << type;
   }
+  EXPECT_TRUE(is_single_dicom("Application/DICOM ; transfer-syntax=*"));
+  EXPECT_FALSE(is_single_dicom("application/dicom+json"));
 }
 
 PeersResponse answer_of(const std::string& text) {

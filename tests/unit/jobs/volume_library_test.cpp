@@ -35,12 +35,34 @@ class VolumeLibraryTest : public test::JobsFixture {
     return library_.add("", folder_ / "upload", raw(geometry));
   }
 
+  static void erase(BlobEraser& eraser, const std::string& key,
+                    const std::function<void()>& erase_record) {
+    eraser.erase([&](const store::BlobsGoing& going) {
+      going(std::span(&key, 1));
+      erase_record();
+    });
+  }
+
+  // Ends the next job with a mesh of these bytes.
+  void finish_with(const std::string& text) {
+    const auto lease = jobs_.claim("worker", std::chrono::hours(1));
+    ASSERT_TRUE(lease);
+    const auto writer = blobs_.begin("");
+    writer->write(std::as_bytes(std::span(text)));
+    const store::Blob blob = writer->commit();
+    store::Outcome outcome;
+    outcome.mesh.emplace();
+    outcome.mesh->files[MeshFormat::kDrc] = {blob.bytes, blob.key, ""};
+    ASSERT_TRUE(jobs_.finish(*lease, outcome));
+    blobs_.mark_named(blob.key);
+  }
+
   // Has the eraser erase a volume of bytes_ after what `meanwhile` does.
   void erase_after(const std::function<void(const Volume& volume)>& meanwhile) {
     const Volume volume = add_bytes(bytes_).first;
     BlobEraser eraser(blobs_, volumes_, data_.erasing());
-    eraser.erase(volume.samples, [&] {
-      volumes_.erase("", volume.id);
+    erase(eraser, volume.samples, [&] {
+      volumes_.erase("", volume.id, {}, {});
       meanwhile(volume);
     });
     eraser.finish();
@@ -175,7 +197,7 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
   for (const Volume& volume : {erased, kept}) {
     test::write_file(data_.erasing() / volume.samples, "");
   }
-  volumes_.erase("", erased.id);
+  volumes_.erase("", erased.id, {}, {});
   std::filesystem::rename(blobs_.path_of(erased.samples), data_.quarantine() / erased.samples);
   BlobEraser next(blobs_, volumes_, data_.erasing());
   next.finish();
@@ -188,13 +210,13 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
 TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   const Volume volume = add_bytes(bytes_).first;
   BlobEraser eraser(blobs_, volumes_, data_.erasing());
-  eraser.erase(volume.samples, [] {});
+  erase(eraser, volume.samples, [] {});
   // An earlier erasure of the same samples, which found them named, leaves the mark alone.
-  eraser.erase(volume.samples, [&] {
+  erase(eraser, volume.samples, [&] {
     eraser.finish();
     EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.samples));
     EXPECT_EQ(blob_count(), 1U);
-    volumes_.erase("", volume.id);
+    volumes_.erase("", volume.id, {}, {});
   });
   eraser.finish();
   EXPECT_EQ(blob_count(), 0U);
@@ -283,7 +305,8 @@ TEST_F(VolumeLibraryTest, VolumesAreErasedConcurrently) {
   class Counting : public store::SqlVolumeStore {
    public:
     explicit Counting(store::Database& database) : SqlVolumeStore(database) {}
-    void erase(const store::Viewer& /*viewer*/, const std::string& /*id*/) override {
+    void erase(const store::Viewer& /*viewer*/, const std::string& /*id*/, store::Made /*made*/,
+               const store::BlobsGoing& /*going*/) override {
       ++begun_;
       EXPECT_TRUE(test::eventually([this] { return begun_ == 2; }));
     }
@@ -303,8 +326,8 @@ TEST_F(VolumeLibraryTest, TheEndLeavesErasingToTheNextStart) {
   constexpr int kMany = 200;
   {
     BlobEraser eraser(blobs_, volumes_, data_.erasing());
-    for (int n = 0; n < kMany; ++n) eraser.erase(std::to_string(n), [] {});
-    eraser.erase(volume.samples, [&] { volumes_.erase("", volume.id); });
+    for (int n = 0; n < kMany; ++n) erase(eraser, std::to_string(n), [] {});
+    erase(eraser, volume.samples, [&] { volumes_.erase("", volume.id, {}, {}); });
   }
   EXPECT_EQ(blob_count(), 1U);
   EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.samples));
@@ -327,12 +350,42 @@ TEST_F(VolumeLibraryTest, WhoeverWaitsForErasingCanBeStopped) {
   Hanging volumes(database_);
   BlobEraser eraser(blobs_, volumes, data_.erasing());
   const std::string key(64, 'a');
-  eraser.erase(key, [] {});
+  erase(eraser, key, [] {});
   std::stop_source stop;
   stop.request_stop();
   eraser.finish(stop.get_token());
   EXPECT_TRUE(std::filesystem::exists(data_.erasing() / key));
   volumes.go = true;
+}
+
+TEST_F(VolumeLibraryTest, AnErasedJobTakesTheFilesThatNoOtherHas) {
+  const Volume volume = add_bytes(bytes_).first;
+  JobParameters parameters;
+  parameters.volume = volume.id;
+  const std::string first = jobs_.submit({"", parameters, "", ""}).job.id;
+  EXPECT_FALSE(library_.erase_job(jobs_, "", first));
+  finish_with("mesh");
+  const std::string again = jobs_.submit({"", parameters, "", ""}).job.id;
+  EXPECT_TRUE(library_.erase_job(jobs_, "", first));
+  library_.finish_erasing();
+  EXPECT_EQ(blob_count(), 2U);
+  EXPECT_TRUE(library_.erase_job(jobs_, "", again));
+  library_.finish_erasing();
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_TRUE(std::filesystem::exists(blobs_.path_of(volume.samples)));
+}
+
+TEST_F(VolumeLibraryTest, AnErasedVolumeTakesItsSurfacesOnRequest) {
+  const Volume volume = add_bytes(bytes_).first;
+  JobParameters parameters;
+  parameters.volume = volume.id;
+  const std::string job = jobs_.submit({"", parameters, "", ""}).job.id;
+  finish_with("mesh");
+  library_.erase("", volume.id, store::Made::kErased);
+  library_.finish_erasing();
+  EXPECT_EQ(code_thrown_by([&] { jobs_.get("", job); }), ErrorCode::kNotFound);
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
 }
 
 // Whoever erases does not wait for the disk, which takes long for what is large and no time for

@@ -137,9 +137,8 @@ TEST_P(BoundProofTest, TellsThatAVertexWasMoved) {
   const Scene scene = balls_and_tunnel(GetParam());
   const ExtractOptions options = {.scheme = GetParam()};
   Mesh mesh = test::extracted(scene.volume, options);
-  std::string why_not;
   const auto bound =
-      simplify_within(scene.volume.lattice(), options, {.max_error_mm = 0.2}, {}, mesh, why_not);
+      simplify_within(scene.volume.lattice(), options, {.max_error_mm = 0.2}, {}, mesh);
   ASSERT_TRUE(bound);
   mesh.positions[7][1] += 0.3F;
   EXPECT_GT(bound->bound_at(mesh.positions.span()), 0.2);

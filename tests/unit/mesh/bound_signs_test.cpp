@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <optional>
 #include <random>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -257,8 +256,7 @@ TEST(BoundSignsTest, GiveTheSameMeshOnEachInstructionSet) {
   std::optional<std::vector<Vec3>> positions;
   on_each_instruction_set([&] {
     Mesh mesh = test::extracted(volume, {});
-    std::string why_not;
-    ASSERT_TRUE(simplify_within(volume.lattice(), {}, {.max_error_mm = 0.1}, {}, mesh, why_not));
+    ASSERT_TRUE(simplify_within(volume.lattice(), {}, {.max_error_mm = 0.1}, {}, mesh));
     const std::vector<Vec3> now(mesh.positions.begin(), mesh.positions.end());
     if (!positions) positions = now;
     EXPECT_TRUE(*positions == now);

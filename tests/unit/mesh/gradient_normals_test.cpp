@@ -51,9 +51,7 @@ TEST(GradientNormals, OfABallPointFromItsCentre) {
         },
         {21, 21, 21}, geometry);
     Mesh mesh = test::extracted(volume, {});
-    std::string why_not;
-    ASSERT_TRUE(
-        simplify_within(volume.lattice(), {}, {.max_error_mm = 0.1 * step}, {}, mesh, why_not));
+    ASSERT_TRUE(simplify_within(volume.lattice(), {}, {.max_error_mm = 0.1 * step}, {}, mesh));
     Buffer<Vec3> normals;
     vertex_normals(mesh, {}, normals);
     const double of_triangles = worst(mesh, normals, outward);

@@ -2,11 +2,14 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/collapse/proposal.h"
 #include "server/mesh/collapse/simplify.h"
+#include "server/mesh/collapse/simplify_layers.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/smooth/smooth.h"
@@ -111,29 +114,52 @@ TEST(SimplifyWalls, LeaveEachLabelASurfaceWhateverTheNumber) {
   }
 }
 
-// Some on junction curves, and some of the walls between them.
-TEST(SimplifyWalls, KeepHeldVertices) {
+// Returns how many triangles are left.
+std::size_t take_what_is_left(const collapse::History& history, SeparatingSurface& surface) {
+  std::vector<Triangle> triangles;
+  std::vector<WallSides> sides;
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+    const Triangle corners = history.corners_of(surface.mesh.triangles[t]);
+    const auto& [a, b, c] = corners;
+    if (a == b || b == c || c == a) continue;
+    triangles.push_back(corners);
+    sides.push_back(surface.sides[t]);
+  }
+  replace_triangles(triangles, sides, surface.mesh);
+  surface.sides.shrink(sides.size());
+  std::ranges::copy(sides, surface.sides.begin());
+  return sides.size();
+}
+
+TEST(SimplifyWalls, StayOfTheirKindWhateverCollapsesAreUndone) {
   const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
   const SeparatingSurface original = smooth_cells(4, options);
-  std::vector<float> shares(original.mesh.positions.size(), 1);
-  std::vector<Vec3> places;
-  std::size_t on_line = 0;
-  for (std::size_t v = 0; v < shares.size(); v += 7) {
-    shares[v] = 0;
-    places.push_back(original.mesh.positions[v]);
-    on_line += original.mesh.is_on_line(v) ? 1 : 0;
-  }
-  EXPECT_GT(on_line, 10U);
-  for (const bool is_measured : {false, true}) {
+  const WalledSurface walled = {original.mesh, original.sides.span()};
+  const WallGrids grids(walled, {});
+  const Original measured = {walled, grids};
+  Proposal proposal = propose({.max_error_mm = 0.3}, {}, original.mesh, &original, &measured);
+  std::size_t left = proposal.triangles.size();
+  EXPECT_LT(left, original.sides.size() / 3);
+  for (std::uint32_t round = 0; round < 8; ++round) {
+    std::vector<std::uint32_t> which;
+    for (std::uint32_t t = round; t < original.sides.size(); t += 1000) which.push_back(t);
+    const std::vector<std::uint32_t> changed =
+        proposal.history.undo(original.mesh.triangles.span(), which, 1 + round);
+    EXPECT_TRUE(std::ranges::is_sorted(changed));
     SeparatingSurface surface = smooth_cells(4, options);
-    SimplifyOptions simplification = {.shares = shares};
-    if (is_measured) simplification.max_error_mm = 0.3;
-    if (!is_measured) simplification.triangles = 4;
-    EXPECT_EQ(simplify(simplification, {}, surface).is_least, !is_measured);
-    std::vector<Vec3> left(surface.mesh.positions.begin(), surface.mesh.positions.end());
-    std::ranges::sort(left);
-    for (const Vec3& place : places) EXPECT_TRUE(std::ranges::binary_search(left, place));
-    EXPECT_LT(left.size(), 2 * original.mesh.positions.size() / 3);
+    const std::size_t before = std::exchange(left, take_what_is_left(proposal.history, surface));
+    EXPECT_GT(left, before);
+    for (std::size_t number = 1; number <= 3; ++number) {
+      const Mesh label = label_mesh(surface, number);
+      EXPECT_EQ(measure_topology(label, {}), measure_topology(label_mesh(original, number), {}));
+      EXPECT_TRUE(test::is_sound(test::surface_of(label))) << number;
+    }
+  }
+  EXPECT_LT(left, original.sides.size());
+  const auto all = consecutive<std::uint32_t>(0, original.sides.size());
+  proposal.history.undo(original.mesh.triangles.span(), all, 1000);
+  for (const Triangle& triangle : original.mesh.triangles) {
+    ASSERT_EQ(proposal.history.corners_of(triangle), triangle);
   }
 }
 

@@ -189,10 +189,10 @@ TEST_P(JobConformance, ADamagedRecordHidesAndBlocksNoOther) {
   const std::string damaged = submit().id;
   const std::string next = submit().id;
   damage("jobs", damaged);
-  const auto listed = jobs().list("", std::nullopt, "", 1);
+  const auto listed = jobs().list("", {}, "", 1);
   ASSERT_EQ(listed.size(), 1U);
   EXPECT_EQ(listed[0].id, next);
-  EXPECT_TRUE(jobs().list("", std::nullopt, next, 1).empty());
+  EXPECT_TRUE(jobs().list("", {}, next, 1).empty());
   EXPECT_EQ(test::code_thrown_by([&] { jobs().get("", damaged); }), ErrorCode::kInternal);
   EXPECT_EQ(claimed().id, next);
   const Job failed = jobs().get("", damaged);
@@ -207,7 +207,7 @@ TEST_P(JobConformance, ADamagedPriorityOrStateIsOneOfThoseThatThereAre) {
   const std::string next = submit().id;
   database().run(Change::kRepeatable, "UPDATE jobs SET priority = 77 WHERE id = ?1", id);
   EXPECT_EQ(jobs().depth("").all_queued(), 2U);
-  EXPECT_EQ(jobs().list("", std::nullopt, "", 9).size(), 2U);
+  EXPECT_EQ(jobs().list("", {}, "", 9).size(), 2U);
   database().run(Change::kRepeatable, "UPDATE jobs SET state = 77 WHERE id = ?1", id);
   damage("jobs", id);
   EXPECT_EQ(jobs().depth("").all_queued(), 1U);
@@ -229,6 +229,36 @@ TEST_P(JobConformance, ADamagedRecordIsCancelledAndFreesItsVolume) {
   EXPECT_EQ(jobs().get("", ended).state, JobState::kCancelled);
   jobs().finish(claimed(), some_mesh());
   EXPECT_NO_THROW(volumes().erase("", kVolume));
+}
+
+TEST_P(JobConformance, AnEndedJobIsErasedOnce) {
+  JobParameters wanted = unlike();
+  wanted.callback = Callback{"http://127.0.0.1/"};
+  const std::string id = submit(wanted).id;
+  EXPECT_FALSE(jobs().erase("", id));
+  const Lease lease = claimed();
+  EXPECT_FALSE(jobs().erase("", id));
+  const std::string blob = put_blob("some mesh");
+  jobs().finish(lease, some_mesh());
+  const std::string reused = submit(wanted).id;
+  std::vector<std::string> going;
+  const auto note = [&](std::span<const std::string> keys) {
+    going.assign(keys.begin(), keys.end());
+  };
+  EXPECT_EQ(code_thrown_by([&] { jobs().erase("other", id, note); }), ErrorCode::kNotFound);
+  EXPECT_EQ(jobs().get("", id).state, JobState::kSucceeded);
+  EXPECT_TRUE(jobs().erase("", id, note));
+  EXPECT_THAT(going, ElementsAre(blob));
+  EXPECT_TRUE(volumes().names(blob));  // by the equal job
+  EXPECT_EQ(code_thrown_by([&] { jobs().get("", id); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().erase("", id); }), ErrorCode::kNotFound);
+  EXPECT_THAT(jobs().events("", id, 0, milliseconds(0)), IsEmpty());
+  EXPECT_EQ(outbox().count(), 1U);
+  damage("jobs", reused);
+  EXPECT_TRUE(jobs().erase(std::nullopt, reused));
+  EXPECT_FALSE(volumes().names(blob));
+  EXPECT_EQ(outbox().count(), 0U);
+  EXPECT_FALSE(submit(wanted).reused);
 }
 
 TEST_P(JobConformance, ARecordThatIsDamagedWhileItRunsDoesNotRunAgain) {

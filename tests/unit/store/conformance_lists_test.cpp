@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "base/clock.h"
 #include "tests/support/errors.h"
 #include "tests/support/stores.h"
 #include "tests/unit/store/engine.h"
@@ -53,10 +54,21 @@ TEST_P(JobListConformance, ListsByState) {
   const std::string running = submit().id;
   claimed();
   const std::string queued = submit().id;
-  EXPECT_THAT(ids_of(jobs().list("", JobState::kCancelled, "", 10)), ElementsAre(cancelled));
-  EXPECT_THAT(ids_of(jobs().list("", JobState::kRunning, "", 10)), ElementsAre(running));
-  EXPECT_THAT(ids_of(jobs().list("", JobState::kQueued, "", 10)), ElementsAre(queued));
-  EXPECT_THAT(jobs().list("", JobState::kFailed, "", 10), IsEmpty());
+  EXPECT_THAT(ids_of(jobs().list("", {.state = JobState::kCancelled}, "", 10)),
+              ElementsAre(cancelled));
+  EXPECT_THAT(ids_of(jobs().list("", {.state = JobState::kRunning}, "", 10)), ElementsAre(running));
+  EXPECT_THAT(ids_of(jobs().list("", {.state = JobState::kQueued}, "", 10)), ElementsAre(queued));
+  EXPECT_THAT(jobs().list("", {.state = JobState::kFailed}, "", 10), IsEmpty());
+  EXPECT_THAT(ids_of(jobs().list("", {.state = JobState::kQueued, .volume = kVolume}, "", 10)),
+              ElementsAre(queued));
+  EXPECT_THAT(jobs().list("", {.volume = "another"}, "", 10), IsEmpty());
+  const Time submitted = time_of(jobs().get("", queued).created);
+  const auto soon = submitted + std::chrono::minutes(1);
+  EXPECT_THAT(ids_of(jobs().list("", {.volume = kVolume, .since = submitted}, "", 1)),
+              ElementsAre(queued));
+  EXPECT_THAT(jobs().list("", {.since = soon}, "", 10), IsEmpty());
+  EXPECT_EQ(jobs().list("", {.until = soon}, "", 10).size(), 3U);
+  EXPECT_THAT(jobs().list("", {.until = submitted - std::chrono::minutes(1)}, "", 10), IsEmpty());
 }
 
 TEST_P(JobListConformance, ACursorNeedNotNameAJob) {

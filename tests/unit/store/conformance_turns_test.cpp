@@ -86,7 +86,7 @@ TEST_P(TurnConformance, WhoWasIdleHasSavedNothingUp) {
 TEST_P(TurnConformance, WhoseJobsCouldNotRunHasSavedNothingUp) {
   submit_many("b", 3);
   EXPECT_TRUE(jobs().put_back(claimed(), kLong));
-  jobs().cancel("b", jobs().list("b", JobState::kQueued, "", 1).at(0).id);
+  jobs().cancel("b", jobs().list("b", {.state = JobState::kQueued}, "", 1).at(0).id);
   EXPECT_EQ(claimed().owner, "b");
   submit_many("a", 20);
   EXPECT_EQ(claim_many(10), "aaaaaaaaaa");
@@ -117,7 +117,8 @@ TEST_P(TurnConformance, PrioritiesComeFirstAndHaveTurnsOfTheirOwn) {
 
 TEST_P(TurnConformance, CancelledJobsTakeNoTurn) {
   submit_many("a", 20);
-  for (const Job& job : jobs().list("a", JobState::kQueued, "", 20)) jobs().cancel("a", job.id);
+  for (const Job& job : jobs().list("a", {.state = JobState::kQueued}, "", 20))
+    jobs().cancel("a", job.id);
   submit_many("a", 2);
   submit_many("b", 2);
   EXPECT_EQ(claim_many(4), "abab");

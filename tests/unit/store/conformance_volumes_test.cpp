@@ -222,6 +222,33 @@ TEST_P(VolumeConformance, KeepsWhatAJobNeeds) {
   EXPECT_EQ(jobs().get("", id).state, JobState::kSucceeded);
 }
 
+TEST_P(VolumeConformance, ErasesTheJobsThatWereMadeOfIt) {
+  volumes().add("", volume_of(kVolume));
+  volumes().add("other", volume_of(kVolume));
+  const std::string blob = put_blob("some mesh");
+  const std::string made = submit().id;
+  jobs().finish(claimed(), some_mesh());
+  const std::string elsewhere = submit(parameters(), "other").id;
+  jobs().finish(claimed(), some_mesh());
+  const std::string cancelled = submit().id;
+  std::vector<std::string> going;
+  const auto erase = [&] {
+    volumes().erase("", kVolume, Made::kErased, [&](std::span<const std::string> keys) {
+      going.insert(going.end(), keys.begin(), keys.end());
+    });
+  };
+  EXPECT_EQ(code_thrown_by(erase), ErrorCode::kNotReady);
+  EXPECT_EQ(jobs().get("", made).state, JobState::kSucceeded);
+  jobs().cancel("", cancelled);
+  going.clear();
+  erase();
+  EXPECT_EQ(code_thrown_by([&] { jobs().get("", made); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().get("", cancelled); }), ErrorCode::kNotFound);
+  EXPECT_EQ(jobs().get("other", elsewhere).state, JobState::kSucceeded);
+  EXPECT_TRUE(volumes().contains("other", kVolume));
+  EXPECT_THAT(going, testing::UnorderedElementsAre(kVolume, blob));
+}
+
 TEST_P(VolumeConformance, OneOfManyThreadsAddsIt) {
   std::atomic<int> added = 0;
   std::vector<std::jthread> threads;

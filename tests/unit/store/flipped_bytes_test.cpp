@@ -136,7 +136,7 @@ TEST_F(FlippedBytes, OfAJobHideNoOtherAndDoNotStopTheQueue) {
   expect_others_found(jobs_[2], record, [&](Database& database) {
     FileBlobStore blobs(data_);
     SqliteJobStore jobs(database, blobs, {});
-    const std::size_t listed = jobs.list("", std::nullopt, "", 9).size();
+    const std::size_t listed = jobs.list("", {}, "", 9).size();
     // The first claim that meets an unreadable row fails, and no later one.
     std::size_t claimed = 0;
     for (std::size_t n = 0; n < kRows + 3; ++n) {

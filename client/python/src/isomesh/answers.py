@@ -21,6 +21,7 @@ LABEL: Members = {"label": int}
 ESTIMATE: Members = {"triangles": int}
 JOB: Members = {"id": str, "state": str, "volume": str, "mesh": (_MESH, _NULL), "error": (dict, _NULL)}
 SUCCEEDED_JOB: Members = {"mesh": _MESH}
+REPORT: Members = {"job": SUCCEEDED_JOB, "volume": (dict, _NULL)}
 MESH_FILE: Members = {"bytes": int, "sha256": str, "href": str}
 _ABSENT = object()
 

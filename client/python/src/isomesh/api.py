@@ -582,6 +582,20 @@ class Job(TypedDict):
     waiting_for: Optional[Literal['disk']]
 
 
+class JobReport(TypedDict):
+    """Everything that a person needs to judge a mesh later. The job has the parameters, times,
+    sizes, components, the bound and how it was proven, and the SHA-256 of each file. The volume
+    has the patient, the geometry and the SHA-256 of the samples."""
+
+    #: The version of the service that reports.
+    version: str
+    #: The version of its code that makes meshes.
+    mesher: str
+    job: Job
+    #: Without the identifiers of single slices. Null if the volume was deleted.
+    volume: Optional[Volume]
+
+
 #: The current stage of a job, or its last one.
 Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
 

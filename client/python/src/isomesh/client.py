@@ -203,9 +203,9 @@ class Client:
         renamed = self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}, answers.VOLUME)
         return cast("api.Volume", renamed)
 
-    def erase(self, volume: Union[str, api.Volume]) -> None:
-        """Deletes a volume from the server."""
-        self._exchange.delete(_volume_path(volume))
+    def erase(self, volume: Union[str, api.Volume], *, jobs: bool = False) -> None:
+        """Deletes a volume from the server, with `jobs` also the ended jobs on it and their meshes."""
+        self._exchange.delete(_volume_path(volume) + ("?jobs=erase" if jobs else ""))
 
     def histogram(self, volume: Union[str, api.Volume], bins: int = 256) -> api.Histogram:
         """How many samples have a value in each of `bins` equal intervals."""
@@ -253,9 +253,18 @@ class Client:
         """The job as it is now."""
         return cast("api.Job", self._exchange.get(_job_path(job), answers.JOB))
 
-    def jobs(self, state: Optional[api.JobState] = None) -> Iterator[api.Job]:
-        """All jobs, or all jobs in one state, the newest first."""
-        query: Dict[str, str] = {"state": state} if state else {}
+    def jobs(
+        self,
+        state: Optional[api.JobState] = None,
+        *,
+        volume: Union[str, api.Volume, None] = None,
+        since: str = "",
+        until: str = "",
+    ) -> Iterator[api.Job]:
+        """All jobs, or those in one state, on one volume, or submitted `since` and before `until`, the newest
+        first. A time is a day such as "2026-11-20", or a time in UTC such as "2026-11-20T07:30:00Z"."""
+        chosen = {"state": state, "volume": _id_of(volume) if volume else "", "since": since, "until": until}
+        query: Dict[str, str] = {key: value for key, value in chosen.items() if value}
         return cast("Iterator[api.Job]", self._exchange.pages("/v1/jobs", "jobs", answers.JOB, query))
 
     def wait(
@@ -299,9 +308,17 @@ class Client:
         pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
         return cast("Iterator[api.LabelSummary]", pages)
 
+    def report(self, job: Union[str, AnyJob]) -> api.JobReport:
+        """What a succeeded job made, of what and how: to keep beside its mesh."""
+        return cast("api.JobReport", self._exchange.get(f"{_job_path(job)}/report", answers.REPORT))
+
     def cancel(self, job: Union[str, AnyJob]) -> api.Job:
         """Cancels a job. A job that has ended stays as it is."""
         return cast("api.Job", self._exchange.cancel(_job_path(job)))
+
+    def erase_job(self, job: Union[str, AnyJob]) -> None:
+        """Deletes an ended job and its files from the server. A job that has not ended is cancelled instead."""
+        self._exchange.delete(_job_path(job))
 
     @by_keywords
     def estimate(

@@ -52,7 +52,7 @@ class Exchange:
         return self._transport.send(Request("DELETE", target)).text()
 
     def cancel(self, target: str) -> Dict[str, Any]:
-        return _parsed(self.delete(target), answers.JOB)
+        return _parsed(self.delete(target + "?erase=false"), answers.JOB)
 
     def send_json(self, method: str, target: str, value: object, members: Members, key: str = "") -> Dict[str, Any]:
         """With an idempotency key, the request is repeated when its connection breaks."""
