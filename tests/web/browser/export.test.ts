@@ -2,6 +2,7 @@
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { describe, expect } from 'vitest';
+import { pixelsOf } from './seen';
 import { ballNrrd, ballsNrrd, madeJob, noiseNrrd, openSurface, setup, surfaceLoaded } from './support';
 
 const { at, it } = setup();
@@ -62,6 +63,15 @@ describe('a surface', () => {
     expect(await page.locator('.print-check').innerText()).toMatch(/Open at .* edges/);
     await bad.getByRole('button', { name: 'Show them' }).click();
     await expect.poll(() => page.locator('.pane').getAttribute('data-marks')).toMatch(/^[1-9]/);
+    const red = async (): Promise<number> => {
+      const pixels = await pixelsOf(page, await page.locator('.viewport').screenshot());
+      return page.evaluate(({ data }) => {
+        let count = 0;
+        for (let i = 0; i < data.length; i += 4) if ((data[i] ?? 0) > 200 && (data[i + 1] ?? 0) < 110 && (data[i + 2] ?? 0) < 120) count += 1;
+        return count;
+      }, pixels);
+    };
+    await expect.poll(red).toBeGreaterThan(40);
     await bad.getByRole('button', { name: 'Make it without smoothing' }).click();
     await expect.poll(() => page.url()).not.toContain(id);
     await surfaceLoaded(page);

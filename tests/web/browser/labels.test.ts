@@ -41,6 +41,29 @@ async function make(page: Page): Promise<JobAnswer> {
   return openedJob(at);
 }
 
+describe('the labels of a surface', () => {
+  it('are put into an order, and saved as a table', async ({ page, daemon }) => {
+    const { id } = await daemon.make({ volume, labels: 'all', formats: ['glb'] });
+    await openSurface(at, id);
+    const rows = page.locator('.label-list .labels li');
+    const order = (): Promise<(string | undefined)[]> => rows.evaluateAll((all) => all.map((row) => (row as HTMLElement).dataset.label));
+    await expect.poll(order).toEqual(['1', '2', '5']);
+    await page.getByLabel('Order of the labels').selectOption('largest volume first');
+    await expect.poll(async () => (await order()).at(-1)).toBe('5');
+    await page.getByLabel('Order of the labels').selectOption('by name');
+    await page.getByLabel('Search the labels').fill('5');
+    await expect.poll(order).toEqual(['5']);
+    expect(await rows.innerText()).toMatch(/volume .* mm³, of its voxels .* mm³; area .* mm²\s*1 component, .* triangles/);
+    const saving = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Save as CSV' }).click();
+    const file = await saving;
+    expect(file.suggestedFilename()).toMatch(/-labels\.csv$/);
+    const lines = readFileSync(await file.path()).toString().trim().split('\r\n');
+    expect(lines).toHaveLength(2);
+    expect(lines[1]).toMatch(/^5,label 5,#[0-9a-f]{6},\d+,/);
+  });
+});
+
 describe('the labels of a volume', () => {
   it('have their colours in slices and in a preview, and their names under the pointer', async ({ page }) => {
     await page.setViewportSize({ width: 1180, height: 760 });

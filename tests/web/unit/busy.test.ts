@@ -105,6 +105,8 @@ describe('while the server is busy', () => {
     await client.labelsOfJob(id);
     await client.labelsOf(id, 0);
     await client.cancelJob(id);
+    // A job that has ended meanwhile is not to be erased.
+    expect(daemon.query.get('erase')).toBe('false');
     expect(refused.size).toBeGreaterThan(8);
     // The stream of jobs is not waited for. It is asked for after 15 seconds.
     refused.delete('GET /v1/events');

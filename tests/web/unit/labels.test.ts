@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { JobParameters, LabelSummary, Label } from '@/api/types';
-import { LabelState, labelTitle, matching } from '@/job/labels';
+import { labelOrders, labelsCsv, LabelState, labelTitle, matching } from '@/job/labels';
 import {
   changed,
   defaultParameters,
@@ -154,5 +154,30 @@ describe('which labels are seen', () => {
     state.pick(12);
     state.pick(99);
     expect(told).toEqual(['hidden 1', '#112233 #445566', '#abcdef #445566', 'label 12', 'nothing']);
+  });
+});
+
+describe('the table of labels', () => {
+  const label = (number: number, name: string, more: Partial<LabelSummary> = {}): LabelSummary =>
+    ({ label: number, name, color: null, voxels: 10, voxels_mm3: 10 * number, closed: true, oriented: true, components: 1, area_mm2: 9, volume_mm3: 8, triangles: 4, ...more }) as LabelSummary;
+  const labels = [label(1, 'Rib 10'), label(2, 'Rib 2', { components: 3 }), label(3, '=A1, "x" y', { closed: false, area_mm2: 99 })];
+
+  it('is put into the order that a person chooses', () => {
+    const order = (name: keyof typeof labelOrders): unknown[] => [...labels].sort(labelOrders[name][1]).map((one) => one.label);
+    expect(order('value')).toEqual([1, 2, 3]);
+    expect(order('name')).toEqual([3, 2, 1]);
+    expect(order('volume')).toEqual([3, 2, 1]);
+    expect(order('area')).toEqual([3, 1, 2]);
+    expect(order('components')).toEqual([2, 1, 3]);
+  });
+
+  it('is read by a spreadsheet, which runs nothing of it', () => {
+    expect(labelsCsv(labels, new Map([[1, '#010203']])).split('\r\n')).toEqual([
+      'label,name,color,voxels,voxels_mm3,mesh_mm3,area_mm2,components,triangles',
+      '1,Rib 10,#010203,10,10,8,9,1,4',
+      '2,Rib 2,,10,20,8,9,3,4',
+      `3,"'=A1, ""x"" y",,10,30,,99,1,4`,
+      '',
+    ]);
   });
 });

@@ -1,3 +1,4 @@
+import { execFileSync } from 'node:child_process';
 import { describe, expect, it } from 'vitest';
 import type { Job, JobParameters } from '@/api/types';
 import { parseRoute, hashOf } from '@/ui/route';
@@ -12,7 +13,7 @@ import {
   queryOfParameters,
   variantOf,
 } from '@/job/parameters';
-import { commandSnippet, curlSnippet, librarySnippet } from '@/job/snippets';
+import { commandSnippet, curlSnippet, javascriptSnippet, librarySnippet, pythonSnippet } from '@/job/snippets';
 import { parameterOf } from '@/job/table';
 import { rawFault } from '@/volume/raw';
 import { draggedWindow } from '@/volume/slices';
@@ -91,9 +92,26 @@ describe('snippets', () => {
     expect(librarySnippet('http://h:1', other, true)).toContain('getenv("ISOMESH_TOKEN")');
   });
 
+  it('are programs in Python and JavaScript', () => {
+    const text = pythonSnippet('http://h:1', other, true);
+    // What Python itself reads of the call.
+    const read = [
+      'import ast, json, sys',
+      'call = [one for one in ast.walk(ast.parse(sys.stdin.read())) if isinstance(one, ast.Call) and getattr(one.func, "attr", "") == "submit"][0]',
+      'print(json.dumps({"volume": ast.literal_eval(call.args[0]), **{one.arg.rstrip("_"): ast.literal_eval(one.value) for one in call.keywords}}))',
+    ].join('\n');
+    expect(JSON.parse(execFileSync('python3', ['-c', read], { input: text }).toString())).toEqual(jobRequest(other));
+    expect(text).toContain('os.environ["ISOMESH_TOKEN"]');
+    expect(text).toContain('client.download(job, "mesh.stl")');
+    const script = javascriptSnippet('http://h:1', other, false);
+    expect(JSON.parse(/submitJob\((.*)\);/.exec(script)?.[1] ?? '')).toEqual(jobRequest(other));
+    expect(script).toContain("client.meshOf(job, 'stl')");
+    expect(script).not.toContain('token');
+  });
+
   it('do not repeat whom to call', () => {
     const called: JobParameters = { ...other, callback: { url: 'https://h/?secret=1' } };
-    for (const text of [curlSnippet, commandSnippet, librarySnippet].map((snippet) => snippet('http://h:1', called, false))) {
+    for (const text of [curlSnippet, commandSnippet, librarySnippet, pythonSnippet, javascriptSnippet].map((snippet) => snippet('http://h:1', called, false))) {
       expect(text).not.toContain('secret');
     }
     expect(JSON.stringify(queryOfParameters(called, defaults))).not.toContain('secret');

@@ -197,8 +197,9 @@ export class Client {
     await this.connection.send(jobPath(id), { method: 'DELETE' });
   }
 
+  /** A job that has ended meanwhile stays as it is. */
   cancelJob(id: string): Promise<Job> {
-    return this.connection.json(jobPath(id), { method: 'DELETE' });
+    return this.connection.json(`${jobPath(id)}${queryOf({ erase: 'false' })}`, { method: 'DELETE' });
   }
 
   /**

@@ -23,6 +23,36 @@ export function matching<T extends Named>(labels: readonly T[], text: string): T
   });
 }
 
+export const labelOrders = {
+  value: ['by value', () => 0],
+  name: ['by name', (a, b) => labelTitle(a).localeCompare(labelTitle(b), undefined, { numeric: true })],
+  volume: ['largest volume first', (a, b) => b.voxels_mm3 - a.voxels_mm3],
+  area: ['largest area first', (a, b) => b.area_mm2 - a.area_mm2],
+  components: ['most components first', (a, b) => b.components - a.components],
+} as const satisfies Record<string, readonly [string, (a: LabelSummary, b: LabelSummary) => number]>;
+
+export type LabelOrder = keyof typeof labelOrders;
+
+// A table of the labels for a spreadsheet. The volume of a mesh that encloses none is empty.
+export function labelsCsv(labels: readonly LabelSummary[], colours: ReadonlyMap<Label, string>): string {
+  const quoted = (text: string): string => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  // A spreadsheet runs what begins with one of these.
+  const safe = (text: string): string => quoted(/^[=+\-@\t\r]/.test(text) ? `'${text}` : text);
+  const rows = labels.map((label) => [
+    String(label.label),
+    safe(labelTitle(label)),
+    colours.get(label.label) ?? label.color ?? '',
+    label.voxels,
+    label.voxels_mm3,
+    label.closed && label.oriented ? label.volume_mm3 : '',
+    label.area_mm2,
+    label.components,
+    label.triangles,
+  ]);
+  const head = ['label', 'name', 'color', 'voxels', 'voxels_mm3', 'mesh_mm3', 'area_mm2', 'components', 'triangles'];
+  return [head, ...rows].map((row) => `${row.join(',')}\r\n`).join('');
+}
+
 // The job itself lists its labels only if they are few.
 export async function labelsOfMesh({ id, mesh }: Job): Promise<readonly LabelSummary[]> {
   return mesh?.labels_count === undefined ? (mesh?.labels ?? []) : client.labelsOfJob(id);

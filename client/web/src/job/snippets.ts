@@ -54,6 +54,43 @@ export function commandSnippet(origin: string, job: JobParameters, hasToken: boo
   ].join('\n');
 }
 
+// As Python writes it.
+function python(value: unknown): string {
+  if (value === null) return 'None';
+  if (typeof value === 'boolean') return value ? 'True' : 'False';
+  if (Array.isArray(value)) return `[${value.map(python).join(', ')}]`;
+  if (typeof value === 'object') return `{${Object.entries(value).map(([name, inner]) => `${JSON.stringify(name)}: ${python(inner)}`).join(', ')}}`;
+  return JSON.stringify(value);
+}
+
+export function pythonSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
+  const { volume, ...others } = jobRequest(job);
+  // lambda is a word of Python's own.
+  const options = Object.entries(others).map(([name, value]) => `    ${name === 'lambda' ? 'lambda_' : name}=${python(value)},`);
+  return [
+    hasToken ? 'import os, isomesh' : 'import isomesh',
+    `client = isomesh.Client(${JSON.stringify(origin)}${hasToken ? ', token=os.environ["ISOMESH_TOKEN"]' : ''})`,
+    'job = client.wait(client.submit(',
+    `    ${JSON.stringify(volume)},`,
+    ...options,
+    '))',
+    ...filesOf(job).map((format) => `client.download(job, "${fileName(format)}")`),
+  ].join('\n');
+}
+
+export function javascriptSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
+  const token = hasToken ? ', token: process.env.ISOMESH_TOKEN' : '';
+  return [
+    `import { writeFile } from 'node:fs/promises';`,
+    `import { Client } from 'isomesh';`,
+    `const client = new Client({ server: ${JSON.stringify(origin)}${token} });`,
+    `const { id } = await client.submitJob(${JSON.stringify(jobRequest(job))});`,
+    'const job = await client.follow(id);',
+    'if (job.state !== \'succeeded\') throw new Error(job.error?.detail ?? job.state);',
+    ...filesOf(job).map((format) => `await writeFile('${fileName(format)}', new Uint8Array(await client.meshOf(job, '${format}')));`),
+  ].join('\n');
+}
+
 // The enumerator in C++: Glb for glb.
 function enumeratorOf(name: string): string {
   return `k${name.charAt(0).toUpperCase()}${name.slice(1)}`;

@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { changeOf, type Change } from '../../job/changes';
 import { isSameJob, variantOf, withGlb, withShownGlb } from '../../job/parameters';
-import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
+import { commandSnippet, curlSnippet, javascriptSnippet, librarySnippet, pythonSnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, definitions, h, type Child } from '../../ui/dom';
@@ -243,11 +243,13 @@ function copyButton(text: () => string): HTMLButtonElement {
 export function againSection(job: Job): HTMLElement {
   const hasToken = token.value !== '';
   const origin = window.location.origin;
-  const texts = {
-    isomesh: commandSnippet(origin, job.parameters, hasToken),
-    curl: curlSnippet(origin, job.parameters, hasToken),
-    library: librarySnippet(origin, job.parameters, hasToken),
-  };
+  const snippets = [
+    ['the isomesh command', commandSnippet],
+    ['curl', curlSnippet],
+    ['Python', pythonSnippet],
+    ['JavaScript', javascriptSnippet],
+    ['the C++ library', librarySnippet],
+  ] as const;
   // With all that the address says of how it is looked at.
   const link = (): string => window.location.href;
   const shown = h('input', { readonly: true, value: `${origin}/${hashOf(['jobs', job.id])}`, 'aria-label': 'Link to this surface' });
@@ -261,8 +263,6 @@ export function againSection(job: Job): HTMLElement {
   return section(
     'Repeat this job',
     h('div.link-row', shown, copyButton(link)),
-    block('With the isomesh command', texts.isomesh),
-    block('With curl', texts.curl),
-    block('With the C++ library', texts.library),
+    ...snippets.map(([name, snippet]) => block(`With ${name}`, snippet(origin, job.parameters, hasToken))),
   );
 }

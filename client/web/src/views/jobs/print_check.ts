@@ -38,7 +38,7 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
     points.push(point('bad', `${formatCount(components)} connected components, which fall apart. `, keep));
   }
   if (crossings && crossings.pairs > 0) {
-    const places = crossings.places as Vec3[];
+    const places = crossings.places;
     const pairs = crossings.pairs === 1 ? '1 pair of triangles crosses. ' : `${formatCount(crossings.pairs)} pairs of triangles cross. `;
     const isAsExtracted = parameters.passes === 0 && !parameters.regularize;
     const extracted = { passes: 0, regularize: false, max_error_mm: null, triangles: null };
@@ -61,7 +61,7 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
   points.push(point('told', `${size} mm${material}.`));
   const files = ['stl', '3mf'].flatMap((format) => {
     const file = mesh.files[format as 'stl'];
-    return file ? [`${meshFormatTitle(format as 'stl')} ${formatBytes(file.bytes)}`] : [];
+    return file ? [`${meshFormatTitle(format)} ${formatBytes(file.bytes)}`] : [];
   });
   points.push(point('told', `${files.join(', ')}; ${formatCount(mesh.triangles)} triangles.`));
   points.push(point('told', 'Thin walls are not measured. Look for walls below the width of your nozzle in the program of your printer.'));

@@ -1,11 +1,11 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
 import type { Job, LabelSummary, Volume, Label } from '../../api/types';
-import { labelTitle, type LabelState } from '../../job/labels';
+import { labelOrders, labelsCsv, labelTitle, type LabelOrder, type LabelState } from '../../job/labels';
 import { fileNameOf } from '../../job/variants';
-import { button, checkbox, h } from '../../ui/dom';
+import { button, checkbox, h, select } from '../../ui/dom';
 import { formatBytes, formatCount, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tellError } from '../../ui/notices';
-import { saveFile } from '../../ui/save';
+import { saveBlob, saveFile } from '../../ui/save';
 import type { Scope } from '../../ui/signal';
 import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
@@ -49,6 +49,15 @@ export class LabelList {
         button('Show all', () => state.showAll(), { title: 'Show every label (e)' }),
         button('Hide all', () => state.hideAll()),
       ),
+      h('div.label-table', [
+        select(
+          Object.entries(labelOrders).map(([name, [title]]) => [name as LabelOrder, title] as const),
+          'value',
+          (name) => search.sort(labelOrders[name][1]),
+          { 'aria-label': 'Order of the labels' },
+        ),
+        button('Save as CSV', () => this.saveTable(search.found), { title: 'Saves a table of the labels that are found: voxels, volumes, areas, components' }),
+      ]),
     ]);
     this.element.append(opacityControl());
     search.fill();
@@ -86,7 +95,8 @@ export class LabelList {
         colour,
         h('div.label-text', [
           check,
-          h('span.faint', `${formatCount(label.triangles)} triangles, volume ${volumeText(label)}`),
+          h('span.faint', `volume ${volumeText(label)}, of its voxels ${formatValue(label.voxels_mm3)} mm\u00b3; area ${areaText(label)}`),
+          h('span.faint', `${formatCount(label.components)} ${label.components === 1 ? 'component' : 'components'}, ${formatCount(label.triangles)} triangles`),
         ]),
         alone,
         ...this.downloads(label, title),
@@ -98,6 +108,11 @@ export class LabelList {
     this.rows.set(label.label, row);
     this.updateRow(label.label, row);
     return row;
+  }
+
+  private saveTable(labels: readonly LabelSummary[]): void {
+    const text = labelsCsv(labels, this.state.colours.value);
+    saveBlob(new Blob([text], { type: 'text/csv' }), fileNameOf(this.job, this.volume, '-labels.csv'));
   }
 
   private downloads(label: LabelSummary, title: string): HTMLElement[] {

@@ -18,6 +18,8 @@ export class LabelSearch<Label extends Named> {
   readonly count = h('p.hint', { role: 'status' });
   readonly input = h('input', { type: 'search', placeholder: 'Name or value', 'aria-label': 'Search the labels' });
 
+  private order: (a: Label, b: Label) => number = () => 0;
+
   // `rowOf` gives a label's row, the same one each time; `summary` says in words how many there are, of which so many
   // were found.
   constructor(
@@ -34,7 +36,12 @@ export class LabelSearch<Label extends Named> {
   }
 
   get found(): readonly Label[] {
-    return matching(this.labels, this.input.value);
+    return matching(this.labels, this.input.value).sort(this.order);
+  }
+
+  sort(order: (a: Label, b: Label) => number): void {
+    this.order = order;
+    this.fill();
   }
 
   fill(): void {
