@@ -13,8 +13,8 @@ void log_ended(const store::JobAccount& account) {
       .add("state", to_string(job.state))
       .add("priority", to_string(job.parameters.priority))
       .add("attempts", account.attempts);
-  visit(job.timing, [&](const std::string& name, double milliseconds) {
-    line.add(name + "_ms", milliseconds);
+  visit(job.timing, [&](const char* stage, double milliseconds) {
+    line.add(std::string(stage) + "_ms", milliseconds);
   });
   if (job.mesh) line.add("triangles", job.mesh->triangles);
   // Only the code: a detail may quote a volume's header.
