@@ -336,7 +336,7 @@ TEST_F(JobsTest, AnUnchangedJobIsNotSentAgain) {
       is_problem(daemon_.get(path, {{"If-Match", "\"other\""}}), ErrorCode::kPreconditionFailed));
   EXPECT_TRUE(is_problem(daemon_.send("DELETE", path, {}, {{"If-Match", "\"other\""}}),
                          ErrorCode::kPreconditionFailed));
-  EXPECT_EQ(daemon_.send("DELETE", path, {}, {{"If-Match", etag}}).status, 200);
+  EXPECT_EQ(daemon_.send("DELETE", path, {}, {{"If-Match", etag}}).status, 204);
 }
 
 // Every item once, in the order of the whole list, whatever the page's size.

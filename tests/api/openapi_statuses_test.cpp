@@ -272,7 +272,7 @@ void probe_damaged(Statuses& statuses, const Daemon& daemon) {
       volume_from_json(daemon.send("POST", "/v1/volumes?dims=2,2,2&type=uint8", "87654321").body);
   const std::string& id = volume.id;
   write_file(daemon.data() / "blobs" / volume.samples.substr(0, 2) / volume.samples, "spoilt");
-  for (const std::string part : {"/histogram", "/labels", "/slice.png", "/preview"}) {
+  for (const std::string part : {"/histogram", "/labels", "/slice.png", "/slice", "/preview"}) {
     statuses.probe("GET /v1/volumes/{id}" + part, "/v1/volumes/" + id + part);
   }
   statuses.probe("GET /v1/estimate", "/v1/estimate?iso=1&volume=" + id);

@@ -203,12 +203,20 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   Order order = order_;
   order.results.emplace_back();
   order.error = job.error;
+  json report = json::parse(daemon_.get("/v1/jobs/" + job_.id + "/report").body);
+  report["volume"] = json::parse(to_json(volume));
+  const auto report_of = [report](const Job& one) mutable {
+    report["job"] = json::parse(to_json(one));
+    return report.dump();
+  };
   const std::vector<std::pair<std::string, std::string>> complete = {
       {"Job", to_json(job)},
       {"JobParameters", to_json(job.parameters)},
       {"JobList", to_json(std::vector{job})},
       {"JobEvent", to_json(JobEvent{})},
-      {"JobReport", daemon_.get("/v1/jobs/" + job_.id + "/report").body},
+      {"JobReport", report_of(job)},
+      {"JobReport", report_of(by_labels)},
+      {"JobReport", report_of(many_labels)},
       {"Volume", to_json(volume)},
       {"VolumeList", to_json(std::vector{volume})},
       {"UploadedVolumes", to_json(std::vector{UploadedVolume{"ct.nrrd", 201, volume, job.error}})},

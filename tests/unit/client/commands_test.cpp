@@ -135,6 +135,10 @@ TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {
   order.id = "8";
   order.state = OrderState::kFailed;
   order.error = to_problem(Error(ErrorCode::kPacsRefused, "no\x1b[2J"), "");
+  order.created = "today";
+  order.source.pacs = "main\x1b[2J";
+  order.source.study = "1.2\x1b[2J";
+  order.rule = "bones\x1b[2J";
   server_.http.Get("/v1/orders", [&](const auto&, auto& response) {
     response.set_content(to_json(std::vector{order}), "application/json");
   });
@@ -150,7 +154,9 @@ TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {
     options_.added = &each;
     told[each.name] = outcome_of(options_).out;
   }
-  EXPECT_EQ(told["orders"], "8 failed: no\uFFFD[2J\n");
+  EXPECT_EQ(told["orders"],
+            "8 failed: no\uFFFD[2J\n"
+            "  ordered today from main\uFFFD[2J, study 1.2\uFFFD[2J, rule bones\uFFFD[2J\n");
   EXPECT_EQ(told["pacs"], "main  last success never  last failure today (no\uFFFD[2J)\n");
 }
 

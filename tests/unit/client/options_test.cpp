@@ -284,7 +284,7 @@ TEST_F(OptionsTest, RefusesWrongUsageAndNamesTheOptionAndItsRange) {
       {{"mesh", file_, "--labels", "all", "-o", drc_}, "-o: " + drc_ + " can hold only one label"}};
   for (const auto& [words, told] : refusals) expect_refused(words, told);
   for (const std::string iso : {"sixty", "nan", "60x", "", "bones"}) {
-    expect_refused({"submit", "abc", "--iso", iso}, "--iso: must be a number, ");
+    expect_refused({"submit", "abc", "--iso", iso}, "--iso: must be a finite number, ");
   }
   for (const std::string dims : {"1,2", "1,2,3,4", "1,,3", "1,2,3,", "99999999999,2,2", "0,2,2"}) {
     expect_refused({"upload", file_, "--dims", dims, "--type", "int16"},

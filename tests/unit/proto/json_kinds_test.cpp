@@ -108,15 +108,15 @@ TEST(JobJson, OfTheErrorComesBackTheSame) {
   EXPECT_EQ(job_from_json(to_json(certified_job())), certified_job());
 }
 
-// Records of a version without the stage.
+// Answers of a server without the stage.
 TEST(JobJson, MayLackTimesOfStagesThatAreNotAlwaysRun) {
   Job job = certified_job();
-  json text = json::parse(to_record(job));
+  json text = json::parse(to_json(job));
   EXPECT_EQ(text["timing"].erase("untangle"), 1U);
   job.timing.untangle = 0;
-  EXPECT_EQ(job_from_record(text.dump()), job);
+  EXPECT_EQ(job_from_json(text.dump()), job);
   text["timing"].erase("smooth");
-  EXPECT_THROW(job_from_record(text.dump()), Error);
+  EXPECT_THROW(job_from_json(text.dump()), Error);
 }
 
 TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {

@@ -263,7 +263,7 @@ class Callback(TypedDict):
     url: str
 
 
-Iso = Union["Union[float, Literal['otsu']]"]
+Iso = Union["Union[float, Literal['otsu'], Literal['skin'], Literal['soft-tissue'], Literal['bone'], Literal['segment']]"]
 Labels = Union["Union[Literal['all'], Sequence[int]]"]
 Background = int
 LabelNames = Union['Union[Mapping[int, str], Mapping[str, str]]']
@@ -367,8 +367,10 @@ class JobOptions(_Parameters, total=False):
     Every member is a keyword of Client.mesh, Client.submit and Client.estimate.
 
     iso
-        The iso-value in the volume's units, or otsu for Otsu's threshold. A sample is inside
-        when its value is >= iso.
+        The iso-value in the volume's units, otsu for Otsu's threshold, or the name of one of
+        the volume's presets. A sample is inside when its value is >= iso. A CT in Hounsfield
+        units has skin, soft-tissue and bone, a fractional segmentation has segment, if the
+        value occurs in it. The job then has the preset's number.
 
     labels
         Labels of a segmentation to mesh instead of an iso-value: their values, or all. Each
