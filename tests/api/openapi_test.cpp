@@ -203,9 +203,10 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   Order order = order_;
   order.results.emplace_back();
   order.error = job.error;
-  json report = json::parse(daemon_.get("/v1/jobs/" + job_.id + "/report").body);
-  report["volume"] = json::parse(to_json(volume));
-  const auto report_of = [report](const Job& one) mutable {
+  json a_report = json::parse(daemon_.get("/v1/jobs/" + job_.id + "/report").body);
+  a_report["volume"] = json::parse(to_json(volume));
+  const auto report_of = [&](const Job& one) {
+    json report = a_report;
     report["job"] = json::parse(to_json(one));
     return report.dump();
   };

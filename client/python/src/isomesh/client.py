@@ -9,13 +9,13 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
 from . import answers, busy, ply, uploads
 from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
 from .exchange import Exchange
-from .files import FINAL_STATES, file_of, format_of, written
+from .files import FINAL_STATES, Arriving, file_of, format_of, written
 from .mesh import Mesh, why_empty
 from .parameters import OMITTED, as_query, by_keywords, given
 from .transport import Transport
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 _LONGEST_WAIT = 30.0  # seconds, the server's
 _SHORTEST_LOOK = 0.2
 _LOOKS_LIKE_LABELS = "looks-like-labels"
-_LONGEST_OBJ_HEAD = 100  # bytes, with the line that names the materials
 
 
 class Client:
@@ -379,7 +378,7 @@ class Client:
         # Readers take several names from the line, divided by blanks, and control characters end it.
         beside = target.with_name(re.sub(r"[\0-\x20\\]", "_", target.with_suffix(".mtl").name))
         with written(target) as file:
-            arriving = _Arriving(file, os.fsencode(beside.name) if form == "obj" else None)
+            arriving = Arriving(file, os.fsencode(beside.name) if form == "obj" else None)
             self._exchange.download(announced, arriving.write)
             arriving.finish()
             if arriving.names_materials:
@@ -443,38 +442,6 @@ class Client:
         data = bytearray()
         self._exchange.download(file_of(job, "ply"), lambda at, piece: _put(data, at, piece))
         return Mesh(**ply.parse(data), job=job, notes=notes, download=self.download)
-
-
-class _Arriving:
-    """A file on its way to disk. In an OBJ, `materials` replaces the name of the file of materials: the first bytes
-    wait until the line that has it is complete."""
-
-    def __init__(self, file: IO[bytes], materials: Optional[bytes]) -> None:
-        self.names_materials = False
-        self._file, self._materials, self._head = file, materials, b""
-
-    def write(self, at: int, piece: bytes) -> None:
-        if at == 0:
-            self._head, self.names_materials = b"", False
-            self._file.seek(0)
-            self._file.truncate()
-        missing = _LONGEST_OBJ_HEAD - len(self._head)
-        if missing > 0:
-            self._head += piece[:missing]
-            if len(self._head) == _LONGEST_OBJ_HEAD:
-                self._write_head()
-        self._file.write(piece[missing:])
-
-    def finish(self) -> None:
-        if len(self._head) < _LONGEST_OBJ_HEAD:
-            self._write_head()
-
-    def _write_head(self) -> None:
-        line, head = b"\nmtllib mesh.mtl\n", self._head
-        self.names_materials = self._materials is not None and line in head
-        if self._materials is not None:
-            head = head.replace(line, b"\nmtllib " + self._materials + b"\n", 1)
-        self._file.write(head)
 
 
 _UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form", "modality")

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     AnyJob = Union[api.Job, api.SucceededJob]
 
 FINAL_STATES = ("succeeded", "failed", "cancelled")
+_LONGEST_OBJ_HEAD = 100  # bytes, with the line that names the materials
 
 
 def format_of(path: Path) -> str:
@@ -73,3 +74,35 @@ def written(target: Path) -> Iterator[IO[bytes]]:
     except BaseException:
         os.unlink(part)
         raise
+
+
+class Arriving:
+    """A file on its way to disk. In an OBJ, `materials` replaces the name of the file of materials: the first bytes
+    wait until the line that has it is complete."""
+
+    def __init__(self, file: IO[bytes], materials: Optional[bytes]) -> None:
+        self.names_materials = False
+        self._file, self._materials, self._head = file, materials, b""
+
+    def write(self, at: int, piece: bytes) -> None:
+        if at == 0:
+            self._head, self.names_materials = b"", False
+            self._file.seek(0)
+            self._file.truncate()
+        missing = _LONGEST_OBJ_HEAD - len(self._head)
+        if missing > 0:
+            self._head += piece[:missing]
+            if len(self._head) == _LONGEST_OBJ_HEAD:
+                self._write_head()
+        self._file.write(piece[missing:])
+
+    def finish(self) -> None:
+        if len(self._head) < _LONGEST_OBJ_HEAD:
+            self._write_head()
+
+    def _write_head(self) -> None:
+        line, head = b"\nmtllib mesh.mtl\n", self._head
+        self.names_materials = self._materials is not None and line in head
+        if self._materials is not None:
+            head = head.replace(line, b"\nmtllib " + self._materials + b"\n", 1)
+        self._file.write(head)
