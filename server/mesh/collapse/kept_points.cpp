@@ -13,12 +13,10 @@ constexpr double kWithin = 1 - 1e-6;
 
 }  // namespace
 
-KeptPoints::KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm,
-                       History& history)
+KeptPoints::KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm)
     : original_(original),
       grids_(grids),
       squared_mm_(std::pow(kWithin * max_error_mm, 2)),
-      history_(history),
       first_(original.view.triangles.size(), kNone),
       next_(original.view.positions.size() + original.view.triangles.size(), kNone) {
   std::vector<bool> is_placed(original.view.positions.size(), false);
@@ -32,8 +30,7 @@ KeptPoints::KeptPoints(const WalledSurface& original, const WallGrids& grids, do
   }
 }
 
-bool KeptPoints::replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes,
-                         const Collapse& collapse) {
+bool KeptPoints::replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes) {
   thread_local std::vector<std::pair<std::uint32_t, std::uint32_t>> moves;  // keeps its memory
   moves.clear();
   for (const std::uint32_t t : star) {
@@ -48,7 +45,6 @@ bool KeptPoints::replace(std::span<const std::uint32_t> star, std::span<const Sh
   }
   for (const std::uint32_t t : star) first_[t] = kNone;
   for (const auto& [point, home] : moves) next_[point] = std::exchange(first_[home], point);
-  history_.add(collapse);
   return true;
 }
 

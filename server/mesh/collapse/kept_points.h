@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "server/mesh/collapse/history.h"
 #include "server/mesh/collapse/misses.h"
 #include "server/mesh/measure/point_triangle.h"
 
@@ -17,9 +16,8 @@ namespace isomesh::mesh::collapse {
 // numbers. Takes some 14 bytes a triangle. Thread safe for different triangles.
 class KeptPoints {
  public:
-  // `grids`: of the original; must outlive it, as `history` must, which is told of collapses.
-  KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm,
-             History& history);
+  // `grids`: of the original; must outlive it.
+  KeptPoints(const WalledSurface& original, const WallGrids& grids, double max_error_mm);
 
   // A triangle with a new first corner. The edge to its second one may be new, and with
   // `is_third_new` that to its third; the others were near before.
@@ -29,10 +27,9 @@ class KeptPoints {
     bool is_third_new = false;
   };
 
-  // True if the collapse may replace the triangles of the `star` by these shapes, some of them. If
-  // so, the points of these are theirs, each one's of its own wall.
-  bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes,
-               const Collapse& collapse);
+  // True if these shapes, some of the triangles of the `star`, may take its place. If so, the
+  // points of these are theirs, each one's of its own wall.
+  bool replace(std::span<const std::uint32_t> star, std::span<const Shape> shapes);
 
  private:
   bool is_near(const Shape& shape) const;
@@ -41,8 +38,7 @@ class KeptPoints {
 
   const WalledSurface original_;
   const WallGrids& grids_;
-  const double squared_mm_;  // that a point may have
-  History& history_;
+  const double squared_mm_;           // that a point may have
   std::vector<std::uint32_t> first_;  // of each triangle
   std::vector<std::uint32_t> next_;   // of each point, of the same triangle
 };

@@ -18,19 +18,18 @@ struct Proposal {
   SimplificationEffect effect;
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> numbers;  // of each: that of the original triangle that became it
-  collapse::History history;           // if distances were measured
+  collapse::History history;
 };
 
-// The surface that the error is measured from.
+// The surface as it was, from which the error is measured.
 struct Original {
   const WalledSurface& surface;
-  const WallGrids& grids;
+  const WallGrids* grids = nullptr;  // of it; none if nothing is measured
 };
 
-// The error is measured at vertices, middles of edges and centres of triangles only; not at all
-// without an original. `walls` are whose mesh it is, if any. The same for any number of threads.
-// Throws as simplify.
+// The error is measured at vertices, middles of edges and centres of triangles only. `walls` are
+// whose mesh it is, if any. The same for any number of threads. Throws as simplify.
 Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-                 const SeparatingSurface* walls, const Original* original);
+                 const SeparatingSurface* walls, const Original& original);
 
 }  // namespace isomesh::mesh

@@ -47,7 +47,7 @@ class Simplifier {
  public:
   // `walls` are whose mesh it is, if any.
   Simplifier(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-             const SeparatingSurface* walls, const Original* original)
+             const SeparatingSurface* walls, const Original& original)
       : options_(options),
         context_(context),
         quiet_{context.stop, nullptr},
@@ -56,15 +56,15 @@ class Simplifier {
         extent_(measure_extent(mesh, quiet_)),
         triangles_(mesh.triangles.begin(), mesh.triangles.end()),
         numbers_(triangles_.size()),
-        around_{quiet_, mesh, unit_of(extent_, triangles_.size()), nullptr, options.max_error_mm},
+        history_(mesh.positions.size()),
+        around_{quiet_,  mesh,      unit_of(extent_, triangles_.size()),
+                nullptr, &history_, options.max_error_mm},
         patches_(
             triangles_, numbers_, mesh.positions.size(),
             [this](std::uint32_t v) { return place_of(v); }, scaled(extent_.high)) {
     std::iota(numbers_.begin(), numbers_.end(), 0U);
-    if (original == nullptr) return;
-    history_ = collapse::History(mesh.positions.size());
-    points_.emplace(original->surface, original->grids, kMeasuredShare * options.max_error_mm,
-                    history_);
+    if (original.grids == nullptr) return;
+    points_.emplace(original.surface, *original.grids, kMeasuredShare * options.max_error_mm);
     around_.points = &*points_;
   }
 
@@ -123,6 +123,7 @@ class Simplifier {
     const std::vector<Triangle> triangles = triangles_;
     const std::vector<std::uint32_t> numbers = numbers_;
     around_.points = nullptr;
+    around_.history = nullptr;
     around_.max_error_mm = std::numeric_limits<double>::infinity();
     reduce_lines(kWhole, 0);
     reduce_whole(triangles.size() - 1);
@@ -228,7 +229,7 @@ class Simplifier {
 }  // namespace
 
 Proposal propose(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-                 const SeparatingSurface* walls, const Original* original) {
+                 const SeparatingSurface* walls, const Original& original) {
   return Simplifier(options, context, mesh, walls, original).run();
 }
 

@@ -43,7 +43,9 @@ struct SimplificationEffect {
 // Simplifies the mesh in place. The remaining vertices keep their order and positions. All boundary
 // vertices are kept, and all of Mesh::on_line if no walls are given. An oriented manifold stays
 // one, with the same boundary, Euler characteristic and orientation. No two triangles lie back to
-// back, so a closed surface has at least four. No triangle loses its area. The layers are joined
+// back, so a closed surface has at least four. No triangle loses its area. None that changed
+// intersects another one, unless the target cannot be reached so, and there is no error that
+// could bind instead. The layers are joined
 // into fewer, deeper ones, so that a triangle names vertices of at most two. Encoders walk along
 // these layers.
 //

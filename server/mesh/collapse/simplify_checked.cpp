@@ -20,7 +20,7 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr int kMostRepairs = 24;
-constexpr int kMostProposals = 6;
+constexpr int kMostProposals = 4;
 
 bool is_left(const Triangle& corners) {
   return corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0];
@@ -52,8 +52,8 @@ class Part {
 };
 
 // Looks at all points of a proposal, and of the original surface, and undoes collapses where one is
-// beyond the error, or where a triangle that they changed intersects another one. From the second
-// round on, it only looks at what may have changed.
+// beyond the error, if there is one, or where a triangle that they changed intersects another one.
+// From the second round on, it only looks at what may have changed.
 class Checker {
  public:
   Checker(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
@@ -75,7 +75,7 @@ class Checker {
       undo(std::size_t{1} << (round / 2), proposal.history);
     }
     take(proposal);
-    return lost_.empty() && !is_beyond_;
+    return grids_ != nullptr && lost_.empty() && !is_beyond_;
   }
 
  private:
@@ -105,10 +105,12 @@ class Checker {
     const WalledSurface left = {{mesh_.positions.span(), corners_}, original_.sides};
     faults_.clear();
     find_crossings(left);
-    const auto added = find_misses(left, fresh_, grids_, within_mm_, context_);
-    for (const Miss& miss : added) faults_.push_back(miss.triangle);
-    is_beyond_ = !added.empty();
-    find_losses(left);
+    if (grids_ != nullptr) {
+      const auto added = find_misses(left, fresh_, *grids_, within_mm_, context_);
+      for (const Miss& miss : added) faults_.push_back(miss.triangle);
+      is_beyond_ = !added.empty();
+      find_losses(left);
+    }
     is_first_ = false;
   }
 
@@ -163,6 +165,7 @@ class Checker {
     std::ranges::sort(fresh_);
     fresh_.erase(std::unique(fresh_.begin(), fresh_.end()), fresh_.end());
     std::erase_if(fresh_, [&](std::uint32_t t) { return !is_left(corners_[t]); });
+    if (grids_ == nullptr) return;
     const MarkedCubes near_changed(changed, within_mm_);
     doubtful_.clear();
     for (std::uint32_t t = 0; t < corners_.size(); ++t) {
@@ -177,7 +180,7 @@ class Checker {
   const Context context_;
   const Mesh& mesh_;
   const WalledSurface& original_;
-  const WallGrids& grids_;  // of it
+  const WallGrids* const grids_;  // of it, if the error is measured
   // By number of the original triangle, which tells its wall, too.
   std::vector<Triangle> corners_;        // what is left of it
   std::vector<std::uint32_t> fresh_;     // of what is left: to look at
@@ -188,29 +191,40 @@ class Checker {
   bool is_first_ = true;
 };
 
-// Proposals with fewer triangles than asked for, if repairs add some.
-Proposal propose_within(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
-                        const SeparatingSurface* walls) {
+// Proposals with fewer triangles than asked for, if repairs add some. Where only the number counts,
+// it goes first: the proposal is as it was if repairs add too many.
+Proposal propose_and_repair(const SimplifyOptions& options, const Context& context,
+                            const Mesh& mesh, const SeparatingSurface* walls) {
   const Context quiet = {context.stop, nullptr};
   const WalledSurface surface = {
       {options.before.empty() ? mesh.positions.span() : options.before, mesh.triangles.span()},
       walls == nullptr ? std::span<const WallSides>() : walls->sides.span()};
-  const WallGrids grids(surface, quiet);
-  const Original original = {surface, grids};
+  std::optional<WallGrids> grids;
+  if (std::isfinite(options.max_error_mm)) grids.emplace(surface, quiet);
+  const Original original = {surface, grids ? &*grids : nullptr};
   Checker checker(options, quiet, mesh, original);
   SimplifyOptions asked = options;
+  std::optional<Proposal> first;  // as it was proposed, where only the number counts
   for (int attempt = 1;; ++attempt) {
     const Context part = context.part(1 - std::pow(0.5, attempt - 1), 1 - std::pow(0.5, attempt));
-    Proposal proposal = propose(asked, part, mesh, walls, &original);
+    Proposal proposal = propose(asked, part, mesh, walls, original);
     SimplificationEffect& effect = proposal.effect;
+    const bool was_reached = effect.reached_triangles;
+    if (!grids && !was_reached) return first ? std::move(*first) : std::move(proposal);
+    if (!grids && !first) {
+      first = {effect, proposal.triangles, proposal.numbers, collapse::History()};
+    }
     effect.is_within = checker.repair(proposal);
     effect.triangles_after = proposal.triangles.size();
     if (options.triangles == 0) return proposal;
-    const bool was_reached = effect.reached_triangles;
     effect.reached_triangles = effect.triangles_after <= options.triangles;
     effect.is_least = effect.is_least && !effect.reached_triangles;
-    if (!was_reached || effect.reached_triangles || attempt == kMostProposals) return proposal;
+    if (!was_reached || effect.reached_triangles) return proposal;
     const std::uint64_t more = effect.triangles_after - options.triangles;
+    const bool is_too_far = !grids && more > options.triangles / 2;
+    if (attempt == kMostProposals || is_too_far) {
+      return first ? std::move(*first) : std::move(proposal);
+    }
     asked.triangles -= std::min(asked.triangles - 1, more + more / 4 + 1);
   }
 }
@@ -224,9 +238,7 @@ SimplificationEffect simplify(const SimplifyOptions& options, const Context& con
   }
   context.throw_if_stopped();
   if (mesh.triangles.size() == 0) return {};
-  Proposal proposal = std::isfinite(options.max_error_mm)
-                          ? propose_within(options, context, mesh, walls)
-                          : propose(options, context, mesh, walls, nullptr);
+  Proposal proposal = propose_and_repair(options, context, mesh, walls);
   context.throw_if_stopped();
   std::vector<WallSides> sides;
   if (walls != nullptr) {

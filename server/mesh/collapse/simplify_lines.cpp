@@ -163,6 +163,9 @@ class LineSimplifier {
     if (is_edge || !links_meet_at_edge(v, into, gone)) return false;
     if (!stays_upright(v, into, kept)) return false;
     if (around_.points != nullptr && !stays_near(v, into, gone, kept)) return false;
+    if (around_.history != nullptr) {
+      around_.history->add({patch_.names[v], patch_.names[into], around_.step + collapses_});
+    }
     move(v, into, beyond, gone, kept);
     return true;
   }
@@ -177,8 +180,7 @@ class LineSimplifier {
       std::rotate(corners.begin(), std::ranges::find(corners, into), corners.end());
       shapes.push_back({star.back(), corners_of(corners), true});
     }
-    const Collapse step = {patch_.names[v], patch_.names[into], around_.step + collapses_};
-    return around_.points->replace(star, shapes, step);
+    return around_.points->replace(star, shapes);
   }
 
   // The triangles around a vertex that a collapse takes away, and those that it leaves.

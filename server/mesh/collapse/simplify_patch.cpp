@@ -85,8 +85,10 @@ class Simplifier : private Collapser<Simplifier> {
       if (!is_upright(at(a), corners)) return false;
       shapes_.push_back({star_.back(), corners});
     }
-    const Collapse step = {patch_.names[a], patch_.names[b], around_.step + collapses_};
-    if (around_.points != nullptr && !around_.points->replace(star_, shapes_, step)) return false;
+    if (around_.points != nullptr && !around_.points->replace(star_, shapes_)) return false;
+    if (around_.history != nullptr) {
+      around_.history->add({patch_.names[a], patch_.names[b], around_.step + collapses_});
+    }
     ++collapses_;
     const Quadric& of_b = nodes_[b].quadric;
     finish(a, k, bucket, nodes_[a].quadric + of_b.about(way(b, a)), nodes_[b].place);

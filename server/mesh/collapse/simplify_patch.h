@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "server/mesh/collapse/history.h"
 #include "server/mesh/collapse/kept_points.h"
 #include "server/mesh/collapse/patches.h"
 #include "server/mesh/context.h"
@@ -17,8 +18,9 @@ struct SimplifySurroundings {
   const Mesh& mesh;              // whose vertices and numbers are taken
   double unit_mm = 1;            // near the length of edges: quadrics have single precision
   KeptPoints* points = nullptr;  // none if nothing is measured
+  History* history = nullptr;    // where collapses are noted, if anywhere
   double max_error_mm = 0;       // of the points
-  std::uint32_t step = 0;        // of the first collapse (history.h)
+  std::uint32_t step = 0;        // of the first collapse, for the history
 };
 
 // Draws vertices into neighbours until `least` triangles are left. Those that stay or have not one

@@ -10,6 +10,7 @@
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/measure/measure.h"
+#include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/smooth/smooth.h"
 #include "server/mesh/topology/topology.h"
 #include "tests/support/any_threads.h"
@@ -221,6 +222,20 @@ TEST(Simplify, GoesOnUntilTheSurfaceNeedsAllThatIsLeft) {
   expect_no_doubles(holes);
   Mesh near = half_ball(false);
   EXPECT_FALSE(simplify({.max_error_mm = 0.01, .triangles = 4}, {}, near).is_least);
+}
+
+TEST(Simplify, ToANumberMakesNoTrianglesIntersect) {
+  for (const bool is_noisy : {false, true}) {
+    for (const std::uint64_t share : {3, 10, 40}) {
+      Mesh mesh = is_noisy ? noisy_handles() : handles(true);
+      ASSERT_EQ(find_self_intersections(mesh, {}).pairs, 0U);
+      const std::uint64_t target = mesh.triangles.size() / share;
+      const SimplificationEffect effect = simplify({.triangles = target}, {}, mesh);
+      EXPECT_EQ(find_self_intersections(mesh, {}).pairs, 0U) << is_noisy << ' ' << share;
+      EXPECT_TRUE(effect.reached_triangles);
+      EXPECT_LE(mesh.triangles.size(), target);
+    }
+  }
 }
 
 TEST(Simplify, SaysWhichOfErrorAndTrianglesHasBound) {

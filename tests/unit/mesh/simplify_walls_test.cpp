@@ -136,8 +136,8 @@ TEST(SimplifyWalls, StayOfTheirKindWhateverCollapsesAreUndone) {
   const SeparatingSurface original = smooth_cells(4, options);
   const WalledSurface walled = {original.mesh, original.sides.span()};
   const WallGrids grids(walled, {});
-  const Original measured = {walled, grids};
-  Proposal proposal = propose({.max_error_mm = 0.3}, {}, original.mesh, &original, &measured);
+  const Original measured = {walled, &grids};
+  Proposal proposal = propose({.max_error_mm = 0.3}, {}, original.mesh, &original, measured);
   std::size_t left = proposal.triangles.size();
   EXPECT_LT(left, original.sides.size() / 3);
   for (std::uint32_t round = 0; round < 8; ++round) {
