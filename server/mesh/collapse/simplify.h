@@ -44,10 +44,9 @@ struct SimplificationEffect {
 // vertices are kept, and all of Mesh::on_line if no walls are given. An oriented manifold stays
 // one, with the same boundary, Euler characteristic and orientation. No two triangles lie back to
 // back, so a closed surface has at least four. No triangle loses its area. None that changed
-// intersects another one, unless the target cannot be reached so, and there is no error that
-// could bind instead. The layers are joined
-// into fewer, deeper ones, so that a triangle names vertices of at most two. Encoders walk along
-// these layers.
+// intersects another one, unless there is no error and only so the target can be reached. The
+// layers are joined into fewer, deeper ones, so that a triangle names vertices of at most two.
+// Encoders walk along these layers.
 //
 // Takes some 100 bytes a triangle beside the mesh, and what TriangleGrid takes. The same mesh for
 // any number of threads. Throws Error kUnusableVolume where a position is not a finite number,
