@@ -156,7 +156,7 @@ print(done["mesh"]["triangles"], client.fetch(done).job["mesh"]["area_mm2"], cli
             "client.submit('x', iso=1, pases=3)": 'Unexpected keyword argument "pases"',
             "client.estimate('x', isoo=1)": 'Unexpected keyword argument "isoo"',
             "client.mesh('x', iso=1, passes='3')": 'expected "int"',
-            "client.mesh('x', iso='otzu')": "Literal['otsu']",
+            "client.mesh('x', iso='otzu')": "Literal['otsu', ",
             "client.mesh('x', formats=['of'])": "Literal['of']",
             "client.mesh('x', components={'kep': 1})": "kep",
             "client.wait('x')['mesh']['aera_mm2']": "aera_mm2",

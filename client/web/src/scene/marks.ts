@@ -13,12 +13,16 @@ export class Marks {
     points.renderOrder = 12;
     points.layers.set(overLayer);
     parent.add(points);
-    this.show([]);
+    this.geometry.setDrawRange(0, 0);
   }
 
-  show(places: readonly Vec3[]): void {
+  // Returns the way from the middle of the bounds to the first of them; null where there is none.
+  show(places: readonly Vec3[], [low, high]: [Vec3, Vec3]): Vec3 | null {
     this.geometry.setAttribute('position', new BufferAttribute(new Float32Array(places.flat()), 3));
     this.geometry.setDrawRange(0, places.length);
+    const [first] = places;
+    const way = first?.map((value, axis) => value - (low[axis as 0] + high[axis as 0]) / 2) as Vec3 | undefined;
+    return way && Math.hypot(...way) > 0 ? way : null;
   }
 
   dispose(): void {

@@ -1,4 +1,4 @@
-// Distances between points of the surface.
+// Distances between points of the surface, and marks on it.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -14,6 +14,7 @@ import { overLayer } from './cross';
 import { h } from '../ui/dom';
 import { formatSize } from '../ui/format';
 import type { Vec3 } from '../api/types';
+import { Marks } from './marks';
 import { lengthOf, type Ruler } from './style';
 
 function labelOf(ruler: Ruler): string {
@@ -23,6 +24,7 @@ function labelOf(ruler: Ruler): string {
 const mostRulers = 32;
 
 export class Rulers {
+  readonly marks: Marks;
   onChange: (() => void) | null = null;
   private rulers: Ruler[] = [];
   private pending: Vec3 | null = null;
@@ -49,6 +51,7 @@ export class Rulers {
     points.renderOrder = 11;
     parent.add(lines, points);
     host.append(this.labels);
+    this.marks = new Marks(parent);
     this.rebuild();
   }
 
@@ -131,6 +134,7 @@ export class Rulers {
     this.lineMaterial.dispose();
     this.pointMaterial.dispose();
     this.labels.remove();
+    this.marks.dispose();
   }
 
   private rebuild(): void {

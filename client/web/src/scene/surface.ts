@@ -15,7 +15,6 @@ import { CoarseMaker } from './coarse_maker';
 import type { Reach } from './distances';
 import { Frame, type Manner } from './frame';
 import { joinSeams } from './joining';
-import { Marks } from './marks';
 import { Parts } from './parts';
 import { pickedAt, type Picked } from './picked';
 import { pictureOf } from './picture';
@@ -23,7 +22,7 @@ import { Rulers } from './rulers';
 import type { SurfaceStyle } from './style';
 import { Uploading } from './uploading';
 import { onTap } from './tap';
-import { firstOffset, fitted, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
+import { firstOffset, fitted, turned, unitBox, viewOffsets, type CameraPlace, type ViewName } from './views';
 
 const settleDelay = 180;
 
@@ -32,7 +31,6 @@ export class Surface {
   readonly rulers: Rulers;
   readonly cut: Cut;
   private readonly cross: Cross;
-  private readonly marks: Marks;
   private readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
   // More blocks can be drawn.
@@ -53,10 +51,7 @@ export class Surface {
   private readonly copies: CoarseMaker;
   private readonly levels = [...new Set(efforts.map(({ triangles }) => triangles))];
   private readonly resizing: ResizeObserver;
-  private bounds: [Vec3, Vec3] = [
-    [-1, -1, -1],
-    [1, 1, 1],
-  ];
+  private bounds = unitBox;
   private scheduled = 0;
   private settling = 0;
   private isMoving = false;
@@ -95,7 +90,6 @@ export class Surface {
     this.rulers = new Rulers(this.scene, host, '#17a398');
     this.cut = new Cut(this.scene);
     this.cross = new Cross(this.scene);
-    this.marks = new Marks(this.scene);
 
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.zoomToCursor = true;
@@ -238,11 +232,8 @@ export class Surface {
 
   // Marks those places, and looks from outside at the first of them.
   mark(places: readonly Vec3[]): void {
-    this.marks.show(places);
-    const [first] = places;
-    if (!first) return;
-    const outwards = first.map((value, axis) => value - (this.bounds[0][axis as 0] + this.bounds[1][axis as 0]) / 2) as Vec3;
-    this.fit(Math.hypot(...outwards) > 0 ? outwards : this.place.offset);
+    const outwards = this.rulers.marks.show(places, this.bounds);
+    if (places.length > 0) this.fit(outwards ?? undefined);
   }
 
   setHidden(labels: ReadonlySet<Label>): void {
@@ -338,8 +329,8 @@ export class Surface {
     cancelAnimationFrame(this.scheduled);
     clearTimeout(this.settling);
     this.resizing.disconnect();
-    const { controls, parts, copies, uploading, rulers, cut, cross, marks, cube, renderer } = this;
-    for (const one of [controls, parts, copies, uploading, this.frame.painting, rulers, cut, cross, marks, cube, renderer]) one?.dispose();
+    const { controls, parts, copies, uploading, rulers, cut, cross, cube, renderer } = this;
+    for (const one of [controls, parts, copies, uploading, this.frame.painting, rulers, cut, cross, cube, renderer]) one?.dispose();
     // The browser keeps only some contexts; it must not wait for garbage to be collected.
     this.renderer.forceContextLoss();
     this.canvas.remove();

@@ -33,6 +33,10 @@ export interface CameraPlace {
 }
 
 export const firstOffset: Vec3 = [0.5, -1, 0.28];
+export const unitBox: [Vec3, Vec3] = [
+  [-1, -1, -1],
+  [1, 1, 1],
+];
 
 export function turned(offset: Vec3, azimuth: number, elevation: number): Vec3 {
   const radius = Math.hypot(...offset);

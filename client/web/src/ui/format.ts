@@ -47,8 +47,9 @@ export function formatSize(value: number): string {
   return size < 1e-4 ? formatValue(value) : formatNumber(value, 2 - Math.floor(Math.log10(size)));
 }
 
-export function formatIso(iso: number | 'otsu'): string {
-  return iso === 'otsu' ? 'Otsu' : formatValue(iso);
+export function formatIso(iso: number | string): string {
+  if (typeof iso === 'number') return formatValue(iso);
+  return iso === 'otsu' ? 'Otsu' : iso;
 }
 
 const units = ['B', 'KB', 'MB', 'GB', 'TB'];
