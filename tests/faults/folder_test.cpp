@@ -17,12 +17,12 @@ TEST_F(Folder, OfANewerVersionIsRefusedAndLeftAsItIs) {
   start();
   small_volume();
   EXPECT_EQ(daemon().stop(), 0);
-  run_sql("UPDATE schema_versions SET version = version + 97");
+  run_sql("UPDATE schema_versions SET version = version + 98");
   const Finished refused = refused_start(folder_ / "data");
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.errors, HasSubstr("newer isomeshd"));
   EXPECT_THAT(refused.errors, HasSubstr("99"));
-  run_sql("UPDATE schema_versions SET version = version - 97");
+  run_sql("UPDATE schema_versions SET version = version - 98");
   start();
   EXPECT_EQ(daemon().client().volumes().size(), 1U);
 }

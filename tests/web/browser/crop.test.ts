@@ -28,7 +28,7 @@ describe('a slice', () => {
     const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
     await page.mouse.move(middle.x, middle.y);
     await page.keyboard.down('Control');
-    for (let step = 0; step < 4; step += 1) await page.mouse.wheel(0, -60);
+    for (let step = 0; step < 21; step += 1) await page.mouse.wheel(0, -60);
     await page.keyboard.up('Control');
     const chip = page.locator('[data-plane=axial] .slice-zoom');
     await expect.poll(() => chip.innerText()).toMatch(/^7\.4 ×$/);

@@ -93,8 +93,8 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
           return { text: cell.textContent, isSeen, lines: (height - 2 * padding) / parseFloat(getComputedStyle(cell).lineHeight) };
         }),
     );
-    // State, priority, surface, result, time and age of each of three jobs.
-    expect(cells).toHaveLength(18);
+    // State, priority, surface, result, time, age and erasing of each of three jobs.
+    expect(cells).toHaveLength(21);
     expect(cells.filter(({ isSeen, lines }) => !isSeen || lines > 3.5)).toEqual([]);
   });
 });
