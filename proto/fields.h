@@ -132,7 +132,7 @@ void visit(Is<Callback> auto& self, auto&& field) {
 void visit(Is<Timing> auto& self, auto&& field) {
   for (const StageRow& row : kStages) {
     if (row.elapsed == nullptr) continue;
-    // Records of before a stage was added lack it.
+    // Servers of before a stage was added do not tell it.
     field(Parameter{.name = row.name, .may_be_absent = !row.is_always_run}, self.*row.elapsed);
   }
   field("total", self.total);

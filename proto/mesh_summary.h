@@ -1,12 +1,3 @@
-// What removing self-intersections found after smoothing, and moved.
-struct Untangling {
-  std::uint64_t pairs = 0;     // of triangles that intersected
-  std::uint64_t vertices = 0;  // moved back towards their extracted positions
-  std::uint64_t left = 0;      // pairs that intersect as extracted
-
-  bool operator==(const Untangling&) const = default;
-};
-
 // A finished job's report on its mesh. Plain values.
 #pragma once
 
@@ -234,6 +225,15 @@ struct MeshCertificate {
   std::optional<ErrorBudget> budget_mm = {};     // if max_error_mm is given
 
   bool operator==(const MeshCertificate&) const = default;
+};
+
+// What removing self-intersections found after smoothing, and moved.
+struct Untangling {
+  std::uint64_t pairs = 0;     // of triangles that intersected
+  std::uint64_t vertices = 0;  // moved back towards their extracted positions
+  std::uint64_t left = 0;      // pairs that intersect as extracted
+
+  bool operator==(const Untangling&) const = default;
 };
 
 struct Simplification {

@@ -68,7 +68,7 @@ struct UploadOptions {
   // Codes of notes whose errors to override, as listed in the server's error.
   std::vector<std::string> accept = {};
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
-  // Of a file that tells none: says that the samples are Hounsfield units.
+  // Says that the samples are Hounsfield units, for a file that does not.
   std::optional<SaidModality> modality = {};
   // Millimetres along x, y and z, for a file that gives none, or instead of those in `raw`.
   std::optional<std::array<double, 3>> spacing = {};
@@ -100,7 +100,7 @@ using JobListener = std::function<void(const JobEvent& event)>;
 // have. Follows links.
 std::filesystem::path materials_beside(const std::filesystem::path& obj);
 
-// Which jobs a list has; all if it is empty.
+// The jobs that a list has; all if it is empty.
 struct JobFilter {
   std::optional<JobState> state = {};
   std::string volume = {};  // id
@@ -198,8 +198,8 @@ class Client {
   // kNotReady, the job's own error or kCancelled as fetch() does.
   std::vector<LabelSummary> job_labels(const std::string& id);
 
-  // What a finished job made, of what and how, as JSON. Throws kNotReady, the job's own error or
-  // kCancelled as fetch() does.
+  // The report on a finished job as JSON: parameters, volume, mesh, versions. Throws kNotReady, the
+  // job's own error or kCancelled as fetch() does.
   std::string report(const std::string& id);
 
   // Writes the mesh of a finished job to `target`, which appears only when complete and with the

@@ -80,7 +80,7 @@ struct Outcome {
   Timing timing;  // with a mesh; otherwise the job keeps the progress of its last renewal
 };
 
-// Which jobs a list has; all if it is empty.
+// The jobs that a list has; all if it is empty.
 struct JobFilter {
   std::optional<JobState> state = {};
   std::optional<std::string> volume = {};

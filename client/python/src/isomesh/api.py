@@ -809,8 +809,8 @@ class LabelFile(TypedDict):
 class MeshQualitySelfIntersections(TypedDict):
     """Pairs of triangles that intersect at more than their shared corners and edges, computed
     exactly: in the decoded file that has the most, with its vertices at the same place as one.
-    Of labels in the walls, before files round their coordinates. Only for a job with
-    certify."""
+    For labels they are counted in the walls, before files round their coordinates. Only for a
+    job with certify."""
 
     pairs: int
     #: Triangles that intersect another one.

@@ -1,4 +1,4 @@
-// What to know before a surface is printed, in plain words, and what helps where it is not ready.
+// A list of what to know before a surface is printed, in plain words, and of what helps where it is not ready.
 import type { Job, Vec3 } from '../../api/types';
 import { isForPrinter } from '../../job/printing';
 import { isByLabels } from '../../job/table';

@@ -212,7 +212,7 @@ export class UploadPanel {
     if (asked && unread(asked, gathered.stored).length > 0) this.rests.push({ gathered, asked });
   }
 
-  // What was not chosen is offered after each series that is read, until there is none or a person says no.
+  // The series that were not chosen are offered after each one that is read, until there is none or a person says no.
   private showRest(rest: Rest): void {
     const { gathered, asked } = rest;
     const no = (): void => {
