@@ -26,7 +26,7 @@ class UntangleJobs : public test::PipelineFixture {
  protected:
   // A surface that smoothing tangles.
   Volume add_tangled() {
-    return add(test::noise_between<float>(-1, 1.5, {20, 19, 18}, 4), SampleType::kFloat32);
+    return add(test::noise_between<float>(-1, 1.5, {12, 11, 10}, 9), SampleType::kFloat32);
   }
 
   // Asks for a certificate, too.
@@ -123,7 +123,7 @@ TEST_F(UntangleJobs, KeepTheirWordWithinAnError) {
 
 TEST_F(UntangleJobs, AreForLabelsToo) {
   const Volume volume =
-      add(test::noise<std::uint8_t>({0, 0, 0, 1, 2}, {16, 15, 14}, 3), SampleType::kUint8);
+      add(test::noise<std::uint8_t>({0, 0, 0, 1, 2}, {10, 9, 9}, 3), SampleType::kUint8);
   for (const Smoothing smoothing : {Smoothing::kLaplacian, Smoothing::kLabels}) {
     JobParameters parameters = label_parameters({.values = {1, 2}});
     parameters.volume = volume.id;

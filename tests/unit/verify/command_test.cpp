@@ -19,7 +19,7 @@ class VerifyCommand : public testing::Test {
   void SetUp() override {
     write_file(volume_,
                "NRRD0004\ntype: float\ndimension: 3\nspace: left-posterior-superior\n"
-               "sizes: 46 41 41\nspace directions: (0.5,0,0) (0,0.5,0) (0,0,0.5)\n"
+               "sizes: 28 21 21\nspace directions: (0.5,0,0) (0,0.5,0) (0,0,0.5)\n"
                "space origin: (0,0,0)\nendian: little\nencoding: raw\n\n" +
                    bytes_of(balls().samples));
     write_file(mesh_, made(balls(), parameters_within(0.1)));
@@ -45,7 +45,7 @@ TEST_F(VerifyCommand, SaysWhereAMeshIsNot) {
   EXPECT_EQ(end.status, 1) << end.errors;
   EXPECT_THAT(end.output, HasSubstr(" mm at ("));
   EXPECT_THAT(end.output, HasSubstr("FAILED"));
-  EXPECT_EQ(verified({"--bound", "0.1", "--close", "--crop=0,0,0,10,10,10"}).status, 1);
+  EXPECT_EQ(verified({"--bound", "0.1", "--close", "--crop=0,0,0,5,5,5"}).status, 1);
 }
 
 TEST_F(VerifyCommand, EndsWithStatusTwoWhereItCannotTell) {

@@ -23,8 +23,6 @@ constexpr std::array<double, 4> kPlaces = {0.1, 0.37, 0.62, 0.93};  // of the tr
 
 class VerifyFaults : public testing::Test {
  protected:
-  void SetUp() override { ASSERT_TRUE(verdict(right_, volume_, parameters_).holds); }
-
   // `plant` makes a fault at a triangle of the mesh.
   void expect_found(const std::function<void(Surface&, std::size_t triangle)>& plant,
                     const std::string& text) {
@@ -53,6 +51,11 @@ class VerifyFaults : public testing::Test {
   const Surface right_ = verify::read_surface(made(volume_, parameters_));
   const Surface surface_ = verify::zero_set(field_of(volume_), {});
 };
+
+TEST_F(VerifyFaults, AreNoneInTheMeshThatWasMade) {
+  const verify::Verdict said = verdict(right_, volume_, parameters_);
+  EXPECT_TRUE(said.holds) << said.text;
+}
 
 // Outwards along the normal, to a hundredth of the bound beyond it.
 TEST_F(VerifyFaults, OfAVertexThatIsALittleTooFar) {

@@ -55,7 +55,7 @@ TEST(Verify, AcceptsJobsWithOtherParameters) {
   extracted_with([](MeshParameters& p) { p.fill_cavities = true; });
   extracted_with([](MeshParameters& p) { p.components.keep = 1; });
   with([](MeshParameters& p) {
-    p.crop = Box{{{4.9, -5, 3}, {14.2, 100, 10}}};
+    p.crop = Box{{{2.4, -5, 1.5}, {7.1, 100, 5}}};
     p.close = true;
   });
   for (const MeshFormat format : {MeshFormat::kPly, MeshFormat::kGlb, MeshFormat::kStl}) {

@@ -76,14 +76,14 @@ verify::Verdict verdict(verify::Surface mesh, const SampleVolume<float>& volume,
 }
 
 SampleVolume<float> balls() {
-  const Field large = sphere({10, 10, 10}, 8.1);
-  const Field hollow = sphere({10, 10, 10}, 4.2);
-  const Field small = sphere({20.5, 10, 10}, 1.4);
+  const Field large = sphere({5, 5, 5}, 4.1);
+  const Field hollow = sphere({5, 5, 5}, 2.1);
+  const Field small = sphere({11, 5, 5}, 1.2);
   Geometry geometry;
   geometry.spacing = {0.5, 0.5, 0.5};
   return sample<float>(
       [&](const Point& p) { return std::max(std::min(large(p), -hollow(p)), small(p)); },
-      {46, 41, 41}, geometry);
+      {28, 21, 21}, geometry);
 }
 
 std::string stl_of(const verify::Surface& surface) {
