@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <optional>
-#include <ranges>
+#include <utility>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -111,17 +111,16 @@ bool TrustedProxies::is_proxy(const std::string& address) const {
 std::string TrustedProxies::client_of(const Request& request) const {
   const std::string_view name =
       header_ == ClientHeader::kForwarded ? "Forwarded" : "X-Forwarded-For";
-  std::string client = request.remote_address;
-  for (const auto& [key, value] : request.headers | std::views::reverse) {
+  std::vector<std::string_view> nodes;
+  for (const auto& [key, value] : request.headers) {
     if (!net::equal_names(key, name)) continue;
-    const std::vector<std::string_view> nodes = split(value, ',');
-    for (const std::string_view node : nodes | std::views::reverse) {
-      if (!is_proxy(client)) return client;
-      const std::string next =
-          address_in(header_ == ClientHeader::kForwarded ? node_in(node) : node);
-      if (next.empty()) return client;
-      client = next;
-    }
+    for (const std::string_view node : split(value, ',')) nodes.push_back(node);
+  }
+  std::string client = request.remote_address;
+  for (auto node = nodes.rbegin(); node != nodes.rend() && is_proxy(client); ++node) {
+    std::string next = address_in(header_ == ClientHeader::kForwarded ? node_in(*node) : *node);
+    if (next.empty()) break;
+    client = std::move(next);
   }
   return client;
 }
