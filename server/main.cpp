@@ -286,6 +286,7 @@ int run(const Options& options, const sigset_t& signals) {
                                    .volumes = volumes,
                                    .jobs = jobs,
                                    .outbox = records->outbox(),
+                                   .audit = records->audit(),
                                    .library = library,
                                    .histograms = histograms,
                                    .labels = labels,

@@ -32,6 +32,9 @@ const std::map<std::string, LogLevel> kLogLevels = {{"debug", LogLevel::kDebug},
                                                     {"off", LogLevel::kOff}};
 const std::map<std::string, LogFormat> kLogFormats = {{"text", LogFormat::kText},
                                                       {"json", LogFormat::kJson}};
+const std::map<std::string, http::ClientHeader> kProxyHeaders = {
+    {"forwarded", http::ClientHeader::kForwarded},
+    {"x-forwarded-for", http::ClientHeader::kXForwardedFor}};
 
 // The library stores an enumerator's number instead of its name.
 template <class Enum>
@@ -49,6 +52,7 @@ std::string value_of(const CLI::Option& option) {
   const std::string& name = option.get_lnames().front();
   if (name == "log-level") return name_in(kLogLevels, value);
   if (name == "log-format") return name_in(kLogFormats, value);
+  if (name == "proxy-header") return name_in(kProxyHeaders, value);
   return value;
 }
 
@@ -106,6 +110,15 @@ std::string wrong_origin(const std::string& text) {
 std::string wrong_host(const std::string& text) {
   const bool is_name = !text.empty() && text.find_first_of(" \t/") == std::string::npos;
   return is_name ? "" : '"' + text + "\" is not a host name";
+}
+
+std::string wrong_proxy(const std::string& text) {
+  try {
+    http::TrustedProxies({text}, {});
+    return "";
+  } catch (const Error& error) {
+    return text + ": " + error.what();
+  }
 }
 
 // Restricts the values of an option.
@@ -218,6 +231,11 @@ std::vector<Row> rows_of(Options& options) {
        "Origins whose pages may use this service, such as https://viewer.example; * allows all"},
       {"allow-host", options.http.hosts, many(wrong_host),
        "Host names that requests without tokens may use, besides loopback names"},
+      {"trusted-proxy", options.http.trusted_proxies, many(wrong_proxy),
+       "Reverse proxies whose header names the address of a client: addresses, networks such as "
+       "10.1.0.0/16, or unix for the clients of a Unix socket"},
+      {"proxy-header", options.http.proxy_header, one_name_of(kProxyHeaders, "x-forwarded-for"),
+       "The header in which those proxies name clients: x-forwarded-for or forwarded"},
       {"max-volume", options.import.max_sample_bytes, bytes(1),
        "Largest size of one volume's uncompressed samples, in bytes"},
       {"imports", options.runner.at_once, between(1, 64),

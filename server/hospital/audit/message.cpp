@@ -40,9 +40,16 @@ std::string coded(std::string_view element, const Code& code) {
          attribute("codeSystemName", code.system) + attribute("originalText", code.meaning) + "/>";
 }
 
-std::string participant(std::string_view user, bool is_requestor, const Code* role) {
-  const std::string head = "<ActiveParticipant" + attribute("UserID", user) +
-                           attribute("UserIsRequestor", is_requestor ? "true" : "false");
+// `address` is that of the user's machine; empty if unknown.
+std::string participant(std::string_view user, bool is_requestor, const Code* role,
+                        std::string_view address = {}) {
+  std::string head = "<ActiveParticipant" + attribute("UserID", user) +
+                     attribute("UserIsRequestor", is_requestor ? "true" : "false");
+  if (!address.empty()) {
+    // Type 2: an IP address.
+    head +=
+        attribute("NetworkAccessPointID", address) + attribute("NetworkAccessPointTypeCode", "2");
+  }
   if (role == nullptr) return head + "/>";
   return head + '>' + coded("RoleIDCode", *role) + "</ActiveParticipant>";
 }
@@ -60,7 +67,8 @@ std::string object(std::string_view id, std::string_view type, std::string_view 
 std::string study_object(const Json& entry) {
   const std::string study = text_of(entry, "study");
   if (study.empty()) return "";
-  const Json* const instances = json_values::find(entry, "instances");
+  const Json* instances = json_values::find(entry, "instances");
+  if (instances == nullptr) instances = json_values::find(entry, "requests");
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
   const std::string count =
       std::to_string(instances == nullptr ? 0 : json_values::whole(*instances, kMost));
@@ -80,15 +88,16 @@ struct Event {
   Code type = {};  // empty: none
 };
 
-Event event_of(const std::string& code) {
+Event event_of(const std::string& code, bool is_login) {
   const Code application = {"110100", "DCM", "Application Activity"};
   if (code == "110120") return {"E", application, {"110120", "DCM", "Application Start"}};
   if (code == "110121") return {"E", application, {"110121", "DCM", "Application Stop"}};
   if (code == "110112") return {"E", {"110112", "DCM", "Query"}};
   if (code == "110104") return {"C", {"110104", "DCM", "DICOM Instances Transferred"}};
   if (code == "110114") {
-    return {
-        "E", {"110114", "DCM", "User Authentication"}, {"110126", "DCM", "Node Authentication"}};
+    const Code login = {"110122", "DCM", "Login"};
+    const Code node = {"110126", "DCM", "Node Authentication"};
+    return {"E", {"110114", "DCM", "User Authentication"}, is_login ? login : node};
   }
   throw Error(ErrorCode::kInternal, "has an unknown event");
 }
@@ -98,7 +107,21 @@ struct Content {
   std::string objects = {};
 };
 
+// Somebody read data of a patient over HTTP, or could not log in.
+Content content_of_request(const Json& entry, const std::string& what, const AuditSource& source) {
+  const std::string address = text_of(entry, "peer");
+  const std::string caller = text_of(entry, "caller");
+  const std::string& user = caller.empty() ? address : caller;
+  const bool is_login = what == "login";
+  return {
+      participant(user.empty() ? "unix" : user, true, is_login ? nullptr : &kDestination, address) +
+          participant(source.station, false, is_login ? nullptr : &kSource),
+      study_object(entry) + patient_object(entry)};
+}
+
 Content content_of(const Json& entry, const std::string& code, const AuditSource& source) {
+  const std::string what = text_of(entry, "what");
+  if (!what.empty()) return content_of_request(entry, what, source);
   const std::string peer = text_of(entry, "pacs");
   const std::string owner = text_of(entry, "owner");
   const std::string asked = owner.empty() ? "" : participant(owner, true, nullptr);
@@ -136,7 +159,7 @@ std::string audit_message(std::string_view text, const AuditSource& source) {
     const JsonTree tree(text);
     const Json& entry = tree.root();
     const std::string code = json_values::text(json_values::existing(entry, "event"));
-    const Event event = event_of(code);
+    const Event event = event_of(code, text_of(entry, "what") == "login");
     const bool is_success = text_of(entry, "outcome") == "success";
     // A failure is serious only if the operation cannot continue; these operations are retried.
     const Content content = content_of(entry, code, source);

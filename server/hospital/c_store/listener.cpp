@@ -289,24 +289,14 @@ void DimseListener::note_transfers(const Transfers& transfers, const std::string
   }
 }
 
-// At most once a second: otherwise anybody who can connect could fill the trail, which cannot be
-// emptied. The others are counted.
 void DimseListener::note_end(const DimseEnded& ended, const std::string& party) {
   if (ended.refusal != DimseRefusal::kCalled && ended.refusal != DimseRefusal::kCalling) return;
-  std::uint64_t unlisted = 0;
-  {
-    const Lock lock(mutex_);
-    if (Clock::now() < next_note_) {
-      ++unnoted_;
-      return;
-    }
-    next_note_ = Clock::now() + std::chrono::seconds(1);
-    unlisted = std::exchange(unnoted_, 0);
-  }
+  const auto unlisted = rejections_.permit();
+  if (!unlisted) return;
   LogLine("association", LogLevel::kWarn)
       .add("rejected", ended.refusal == DimseRefusal::kCalled ? "called-title" : "calling-title")
       .add("peer", party)
-      .add("unlisted", unlisted);
+      .add("unlisted", *unlisted);
   services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
                        .success = false,
                        .peer_name = "dimse",
@@ -314,7 +304,7 @@ void DimseListener::note_end(const DimseEnded& ended, const std::string& party) 
                        .peer = party,
                        .called = ended.called,
                        .calling = ended.calling,
-                       .unlisted = unlisted});
+                       .unlisted = *unlisted});
 }
 
 }  // namespace isomesh::c_store

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/mutex.h"
+#include "base/throttle.h"
 #include "server/hospital/c_store/acceptor.h"
 #include "server/hospital/dimse/message.h"
 #include "server/hospital/orders/settings.h"
@@ -100,8 +101,8 @@ class DimseListener {
   // All open associations, and those that no thread has taken yet.
   std::vector<std::shared_ptr<Association>> open_ ISOMESH_GUARDED_BY(mutex_);
   std::deque<std::shared_ptr<Association>> ready_ ISOMESH_GUARDED_BY(mutex_);
-  std::chrono::steady_clock::time_point next_note_ ISOMESH_GUARDED_BY(mutex_);
-  std::uint64_t unnoted_ ISOMESH_GUARDED_BY(mutex_) = 0;  // rejected since the last note
+  // Otherwise anybody who can connect could fill the trail, which cannot be emptied.
+  Throttle rejections_{std::chrono::seconds(1)};
   // Last: its thread and these use the other members.
   AssociationAcceptor acceptor_;
   std::vector<std::jthread> threads_;

@@ -139,6 +139,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
            .has_ended = [this](const std::string& job) { return has_ended(services, job); },
            .on_answered =
                [this](const Request& request, const Response& response, const BodySizes& sizes) {
+                 reads.note(request, response);
                  end_request(metrics, request, response, sizes);
                },
            .on_refused = [this](const std::string& address,
@@ -167,6 +168,7 @@ std::optional<Continuation> guarded(const store::DataFolder& folder, const Reque
 
 std::optional<Continuation> answer(App& app, Request& request, Response& response) {
   const store::DataFolder& folder = app.services.folder;
+  request.remote_address = app.proxies.client_of(request);
   auto continuation =
       guarded(folder, request, response, [&] { return checked_answer(app, request, response); });
   if (!continuation) return std::nullopt;

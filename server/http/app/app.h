@@ -9,6 +9,7 @@
 #include "server/http/connections/connections.h"
 #include "server/http/guards/access.h"
 #include "server/http/guards/origin.h"
+#include "server/http/observe/read_trail.h"
 #include "server/http/observe/readiness.h"
 #include "server/http/requests/kept_uploads.h"
 #include "server/http/requests/response.h"
@@ -32,6 +33,8 @@ struct App {
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
   RefusedOrigins refused_origins;
+  const TrustedProxies proxies{options.trusted_proxies, options.proxy_header};
+  ReadTrail reads{{services.audit, services.volumes, services.jobs}};
   // Earlier events belong to a previous process.
   const std::uint64_t first_event = services.jobs.last_event();
   std::atomic<bool> draining = false;  // finish running jobs, accept no new ones

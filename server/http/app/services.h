@@ -8,6 +8,7 @@
 
 #include "server/callbacks/callbacks.h"
 #include "server/http/app/wing.h"
+#include "server/http/guards/proxies.h"
 #include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/requests/upload.h"
@@ -16,6 +17,7 @@
 #include "server/jobs/library/volume_library.h"
 #include "server/jobs/queue/estimate.h"
 #include "server/net/tls.h"
+#include "server/store/audit/trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 #include "server/store/outbox.h"
@@ -38,8 +40,10 @@ struct ServerOptions {
   std::uint64_t part_bytes = 0;
   std::vector<std::string> cors_origins;  // origins of pages that may use the service; `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
-  bool blob_redirect = false;             // downloads may be redirected to the blob store
-  const net::TlsFiles* tls = nullptr;     // null: no TLS
+  std::vector<std::string> trusted_proxies;  // as TrustedProxies has them
+  ClientHeader proxy_header = ClientHeader::kXForwardedFor;
+  bool blob_redirect = false;          // downloads may be redirected to the blob store
+  const net::TlsFiles* tls = nullptr;  // null: no TLS
 };
 
 // Give each by its name. All must outlive the server.
@@ -50,6 +54,7 @@ struct Services {
   const store::VolumeStore& volumes;
   store::JobStore& jobs;
   const store::Outbox& outbox;
+  store::AuditTrail& audit;
   // Work on it.
   jobs::VolumeLibrary& library;
   jobs::Histograms& histograms;

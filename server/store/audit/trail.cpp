@@ -48,15 +48,19 @@ std::string audit_record(const AuditEntry& entry) {
         std::pair{"pacs", &entry.peer_name}, std::pair{"direction", &entry.direction},
         std::pair{"study", &entry.study}, std::pair{"patient_id", &entry.patient_id},
         std::pair{"peer", &entry.peer}, std::pair{"called", &entry.called},
-        std::pair{"calling", &entry.calling}}) {
+        std::pair{"calling", &entry.calling}, std::pair{"caller", &entry.caller},
+        std::pair{"what", &entry.what}, std::pair{"volume", &entry.volume},
+        std::pair{"job", &entry.job}}) {
     if (!text->empty()) put(name, *text);
   }
-  if (entry.event == AuditEvent::kTransferred) {
-    json_values::assign(json_values::member(json.root(), "instances"), entry.instances);
+  const auto count = [&](const char* name, std::uint64_t number) {
+    json_values::assign(json_values::member(json.root(), name), number);
+  };
+  if (entry.event == AuditEvent::kTransferred && entry.requests == 0) {
+    count("instances", entry.instances);
   }
-  if (entry.unlisted > 0) {
-    json_values::assign(json_values::member(json.root(), "unlisted"), entry.unlisted);
-  }
+  if (entry.unlisted > 0) count("unlisted", entry.unlisted);
+  if (entry.requests > 0) count("requests", entry.requests);
   return dump(json.root());
 }
 

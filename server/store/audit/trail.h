@@ -13,7 +13,7 @@
 
 namespace isomesh::store {
 
-// The events of DICOM PS3.15, A.5, that concern orders, with their codes of the coding scheme DCM.
+// Events of DICOM PS3.15, A.5, with their codes of the coding scheme DCM.
 enum class AuditEvent {
   kStart,                  // 110120 Application Start
   kStop,                   // 110121 Application Stop
@@ -37,6 +37,12 @@ struct AuditEntry {
   std::string called = {};
   std::string calling = {};
   std::uint64_t unlisted = 0;  // rejected since the entry before, without entries of their own
+  // Readings over HTTP, and refused logins there.
+  std::string caller = {};  // the name of the token; empty without tokens
+  std::string what = {};    // "volume", "labels", "slice", "mesh", ..., or "login"
+  std::string volume = {};
+  std::string job = {};        // of a mesh
+  std::uint64_t requests = 0;  // that the entry stands for
 };
 
 // The stored form of an entry, and its form as a line.

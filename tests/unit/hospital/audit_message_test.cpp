@@ -70,6 +70,32 @@ TEST(AuditMessage, ByCStoreTheSenderIsItsTitle) {
                              "csd-code=\"110152\""));
 }
 
+TEST(AuditMessage, OfAReadingNamesTheReaderAndTheAddress) {
+  const std::string xml = audit_message(
+      R"({"id":7,"at":"2026-11-20T10:00:00.123Z","event":"110104","outcome":"success",)"
+      R"("direction":"out","study":"1.2.3","patient_id":"PAT","peer":"10.0.0.7","caller":"ann",)"
+      R"("what":"slice","volume":"abc","requests":12})",
+      kSource);
+  EXPECT_TRUE(is_xml(xml)) << xml;
+  EXPECT_THAT(xml, HasSubstr("UserID=\"ann\" UserIsRequestor=\"true\" "
+                             "NetworkAccessPointID=\"10.0.0.7\" "
+                             "NetworkAccessPointTypeCode=\"2\"><RoleIDCode csd-code=\"110152\""));
+  EXPECT_THAT(xml, HasSubstr("UserID=\"isomesh-1\" UserIsRequestor=\"false\"><RoleIDCode "
+                             "csd-code=\"110153\""));
+  EXPECT_THAT(xml, HasSubstr("NumberOfInstances=\"12\""));
+  EXPECT_THAT(xml, HasSubstr("ParticipantObjectID=\"PAT\""));
+}
+
+TEST(AuditMessage, OfARefusedLoginNamesTheAddress) {
+  const std::string xml = audit_message(
+      R"({"id":7,"at":"2026-11-20T10:00:00.123Z","event":"110114","outcome":"failure",)"
+      R"("peer":"10.0.0.7","what":"login"})",
+      kSource);
+  EXPECT_TRUE(is_xml(xml)) << xml;
+  EXPECT_THAT(xml, HasSubstr("<EventTypeCode csd-code=\"110122\""));
+  EXPECT_THAT(xml, HasSubstr("UserID=\"10.0.0.7\" UserIsRequestor=\"true\""));
+}
+
 TEST(AuditMessage, EveryEventHasOne) {
   for (const auto& [code, id, type] :
        {std::tuple{"110120", "110100", "110120"}, std::tuple{"110121", "110100", "110121"},

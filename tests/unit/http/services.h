@@ -48,12 +48,14 @@ class OpenServices {
  public:
   store::SqlVolumeStore& volumes() { return volumes_; }
   LateJobStore& jobs() { return jobs_; }
+  store::AuditTrail& audit() { return audit_; }
   Services all(Wing* wing = nullptr) {
     return {.folder = data_,
             .blobs = blobs_,
             .volumes = volumes_,
             .jobs = jobs_,
             .outbox = outbox_,
+            .audit = audit_,
             .library = library_,
             .histograms = histograms_,
             .labels = labels_,
@@ -80,6 +82,7 @@ class OpenServices {
   jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}, jobs::JobProgram{}};
   Metrics metrics_;
   store::SqlOutbox outbox_{database_};
+  store::AuditTrail audit_{database_};
   const callbacks::CallbackTargets targets_{{}};
   callbacks::Callbacks callbacks_{outbox_, targets_, {}, {}};
 };

@@ -1,0 +1,156 @@
+#include "server/http/observe/read_trail.h"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "base/log.h"
+#include "proto/error.h"
+
+namespace isomesh::http {
+namespace {
+
+// Windows that are open at the same time; beyond it, all are closed early.
+constexpr std::size_t kMostWindows = 10'000;
+
+constexpr int kUnauthorized = 401;
+
+bool is_read(int status) {
+  return (status >= 200 && status < 300) || status == 304 || status == 307;
+}
+
+// Answers to requests for data that may exist and that the caller may not read.
+bool is_refused(int status) { return status == 403 || status == 404 || status == 410; }
+
+bool is_transfer(std::string_view what) {
+  return what == "slice" || what == "preview" || what == "mesh";
+}
+
+// The record, or empty if there is none.
+template <class Get>
+auto record_of(const Get& get) -> std::optional<decltype(get())> {
+  try {
+    return get();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+ReadTrail::ReadTrail(const Stores& stores, std::chrono::milliseconds window)
+    : stores_(stores), window_(window), closing_([this](const std::stop_token& stop) {
+        const std::chrono::milliseconds between = std::max(window_ / 10, decltype(window_)(1));
+        while (!stop.stop_requested()) {
+          pause(stop, between);
+          const Lock lock(mutex_);
+          close_windows(stop.stop_requested() ? Clock::time_point::max() : Clock::now());
+        }
+      }) {}
+
+ReadTrail::~ReadTrail() {
+  closing_.request_stop();
+  closing_.join();
+}
+
+// Every route below a volume or a job tells about its patient, except a job's state and events.
+std::optional<ReadTrail::Reading> ReadTrail::reading_of(const Request& request,
+                                                        const Response& response) {
+  constexpr std::string_view kVolume = "/v1/volumes/{id}";
+  constexpr std::string_view kJob = "/v1/jobs/{id}";
+  if (request.method != "GET" && request.method != "HEAD") return std::nullopt;
+  const std::string_view route = request.context.route;
+  const bool is_of_job = route.starts_with(kJob);
+  if (!is_of_job && !route.starts_with(kVolume)) return std::nullopt;
+  if (!is_read(response.status) && !is_refused(response.status)) return std::nullopt;
+  std::string_view what = route.substr((is_of_job ? kJob : kVolume).size());
+  if (is_of_job && (what.empty() || what == "/events")) return std::nullopt;
+  what = what.empty() ? "volume" : what.substr(1);
+  return Reading{.caller = request.context.caller.name,
+                 .address = request.remote_address,
+                 .is_of_job = is_of_job,
+                 .id = request.path_parameter("id"),
+                 .what = std::string(what.substr(0, what.find('.'))),
+                 .success = is_read(response.status)};
+}
+
+std::optional<store::AuditEntry> ReadTrail::entry_of(const Reading& reading) const {
+  store::AuditEntry entry = {.event = is_transfer(reading.what) ? store::AuditEvent::kTransferred
+                                                                : store::AuditEvent::kQuery,
+                             .success = reading.success,
+                             .peer = reading.address,
+                             .caller = reading.caller,
+                             .what = reading.what,
+                             .volume = reading.id,
+                             .requests = 1};
+  if (is_transfer(reading.what)) entry.direction = "out";
+  if (reading.is_of_job) {
+    const auto job = record_of([&] { return stores_.jobs.get(store::Viewer(), reading.id); });
+    if (!job) return std::nullopt;
+    entry.job = reading.id;
+    entry.volume = job->parameters.volume;
+  }
+  const auto volume = record_of([&] { return stores_.volumes.get(store::Viewer(), entry.volume); });
+  // The mesh of an erased volume may have a patient; earlier entries of the volume name them.
+  if (!volume) return reading.is_of_job ? std::optional(entry) : std::nullopt;
+  if (!volume->dicom) return std::nullopt;
+  entry.study = volume->dicom->study_uid;
+  entry.patient_id = volume->dicom->patient_id;
+  return entry;
+}
+
+bool ReadTrail::add(const store::AuditEntry& entry) const {
+  try {
+    stores_.audit.add(entry);
+    return true;
+  } catch (const std::exception& error) {
+    log_error("the audit trail cannot be written to: {}", error.what());
+    return false;
+  }
+}
+
+void ReadTrail::close_windows(Clock::time_point until) {
+  std::erase_if(windows_, [&](const auto& each) {
+    const Window& window = each.second;
+    if (window.end > until) return false;
+    if (!window.entry || window.counted == 0) return true;
+    store::AuditEntry entry = *window.entry;
+    entry.requests = window.counted;
+    return add(entry) || until == Clock::time_point::max();
+  });
+}
+
+void ReadTrail::note_refusal(const Request& request) {
+  const auto unlisted = refusals_.permit();
+  if (!unlisted) return;
+  add({.event = store::AuditEvent::kAuthenticationFailure,
+       .success = false,
+       .peer = request.remote_address,
+       .unlisted = *unlisted,
+       .what = "login"});
+}
+
+void ReadTrail::note(const Request& request, const Response& response) {
+  if (response.status == kUnauthorized) return note_refusal(request);
+  const auto reading = reading_of(request, response);
+  if (!reading) return;
+  // Held while the entry is written, so that no response to the same reading is sent before.
+  const Lock lock(mutex_);
+  const auto found = windows_.find(*reading);
+  if (found != windows_.end() && Clock::now() < found->second.end) {
+    ++found->second.counted;
+    return;
+  }
+  if (found != windows_.end()) close_windows(Clock::now());
+  if (windows_.size() >= kMostWindows) close_windows(Clock::time_point::max());
+  try {
+    std::optional<store::AuditEntry> entry = entry_of(*reading);
+    if (entry && !add(*entry)) return;
+    windows_[*reading] = {.end = Clock::now() + window_, .entry = std::move(entry)};
+  } catch (const std::exception& error) {
+    log_error("the audit trail has no entry for a reading: {}", error.what());
+  }
+}
+
+}  // namespace isomesh::http

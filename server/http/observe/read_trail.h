@@ -1,0 +1,83 @@
+// Enters into the audit trail who reads the data of patients, and whose token was refused.
+#pragma once
+
+#include <chrono>
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "base/mutex.h"
+#include "base/throttle.h"
+#include "server/http/requests/request.h"
+#include "server/http/requests/response.h"
+#include "server/store/audit/trail.h"
+#include "server/store/job_store.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::http {
+
+// A view of a volume requests a hundred slices. The first request of a caller for one kind of data
+// of one volume or job is entered before its response is sent; the requests within a window after
+// it are counted, and entered as one number when the window ends. If the process is killed, only
+// such a number is lost. Data without a patient is not entered. Thread safe.
+class ReadTrail {
+ public:
+  struct Stores {
+    store::AuditTrail& audit;
+    const store::VolumeStore& volumes;
+    const store::JobStore& jobs;
+  };
+
+  // The stores must outlive this object.
+  explicit ReadTrail(const Stores& stores,
+                     std::chrono::milliseconds window = std::chrono::minutes(10));
+  // Enters what was counted.
+  ~ReadTrail();
+  ReadTrail(const ReadTrail&) = delete;
+  ReadTrail& operator=(const ReadTrail&) = delete;
+
+  // Call with every response before it is sent. Does not throw: a trail that cannot be written to
+  // is logged, because physicians need their images nevertheless.
+  void note(const Request& request, const Response& response) ISOMESH_EXCLUDES(mutex_);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct Reading {
+    std::string caller;
+    std::string address;
+    bool is_of_job = false;
+    std::string id;    // of the volume or the job
+    std::string what;  // "volume", "slice", "mesh", ...
+    bool success = true;
+
+    auto operator<=>(const Reading&) const = default;
+  };
+
+  struct Window {
+    Clock::time_point end;
+    std::optional<store::AuditEntry> entry;  // empty if there is no patient
+    std::uint64_t counted = 0;               // requests since the entry
+  };
+
+  static std::optional<Reading> reading_of(const Request& request, const Response& response);
+  // Empty if there is no patient.
+  std::optional<store::AuditEntry> entry_of(const Reading& reading) const;
+  void note_refusal(const Request& request);
+  // Returns false if the trail cannot be written to.
+  bool add(const store::AuditEntry& entry) const;
+  // Enters the counts of the windows that have ended by then, and closes those.
+  void close_windows(Clock::time_point until) ISOMESH_REQUIRES(mutex_);
+
+  const Stores stores_;
+  const std::chrono::milliseconds window_;
+  Throttle refusals_{std::chrono::seconds(1)};  // otherwise strangers could fill the trail
+  Mutex mutex_;
+  std::map<Reading, Window> windows_ ISOMESH_GUARDED_BY(mutex_);
+  std::jthread closing_;  // last: uses the other members
+};
+
+}  // namespace isomesh::http
