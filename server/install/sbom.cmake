@@ -1,4 +1,4 @@
-# What each component is made of, and the licences of others in it, beside its documents. Told by ninja, so it is
+# What each component is made of, for what, and the licences of others in it, beside its documents. Told by ninja, so it is
 # made when a build is installed; on other systems than Debian there is none.
 find_program(ISOMESH_DPKG_QUERY dpkg-query)
 find_program(ISOMESH_PYTHON python3)
@@ -20,7 +20,11 @@ function(isomesh_sbom component package)
   install(CODE "execute_process(COMMAND \"${ISOMESH_PYTHON}\" \"${PROJECT_SOURCE_DIR}/server/install/sbom\"
     --build \"${PROJECT_BINARY_DIR}\" ${page} --version ${PROJECT_VERSION} --into \"${into}\" ${package} ${targets}
     COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${component})
-  install(FILES ${into}/sbom.cdx.json ${into}/third-party-licenses.gz
+  set(soup ${into}/soup.md)
+  if(component STREQUAL "dev")
+    set(soup)  # only programs isolate what is in them
+  endif()
+  install(FILES ${into}/sbom.cdx.json ${into}/third-party-licenses.gz ${soup}
     DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
 endfunction()
 
