@@ -89,9 +89,8 @@ void Tree::build(std::vector<Item>& items, std::uint32_t begin, std::uint32_t en
   build(items, middle, end);
 }
 
-Nearest Tree::nearest(const Vec& point, std::uint32_t hint) const {
-  if (nodes_.empty()) return {};
-  Nearest best = {squared_distance(point, surface_.corners(hint), kFar), hint};
+template <class Takes>
+Nearest Tree::nearest_of(const Vec& point, Nearest best, const Takes& takes) const {
   using Waiting = std::pair<double, std::uint32_t>;  // the squared distance to a node's box
   const auto waiting_for = [&](std::uint32_t node) {
     double sum = 0;
@@ -110,8 +109,9 @@ Nearest Tree::nearest(const Vec& point, std::uint32_t hint) const {
     if (least >= best.squared) continue;
     const Node& node = nodes_[at];
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
-      const double found = squared_distance(point, surface_.corners(t), best.squared);
-      if (found < best.squared) best = {found, t};
+      const Corners corners = surface_.corners(t);
+      const double found = squared_distance(point, corners, best.squared);
+      if (found < best.squared && takes(corners)) best = {found, t};
     }
     if (node.count > 0) continue;
     std::tie(stack[count + 1], stack[count]) =
@@ -119,6 +119,19 @@ Nearest Tree::nearest(const Vec& point, std::uint32_t hint) const {
     count += 2;
   }
   return best;
+}
+
+Nearest Tree::nearest(const Vec& point, std::uint32_t hint) const {
+  if (nodes_.empty()) return {};
+  const Nearest best = {squared_distance(point, surface_.corners(hint), kFar), hint};
+  return nearest_of(point, best, [](const Corners&) { return true; });
+}
+
+bool Tree::has_near(const Vec& point, double distance, const Vec& normal) const {
+  if (nodes_.empty()) return false;
+  const double most = distance * distance;
+  const auto faces = [&](const Corners& corners) { return dot(normal_of(corners), normal) > 0; };
+  return nearest_of(point, {most, 0}, faces).squared < most;
 }
 
 }  // namespace isomesh::verify

@@ -59,6 +59,9 @@ class Tree {
   // The nearest triangle to a point, or `hint` if none is nearer. Infinitely far if there is none.
   Nearest nearest(const Vec& point, std::uint32_t hint) const;
 
+  // True if a triangle within that distance of the point faces the same side as the normal.
+  bool has_near(const Vec& point, double distance, const Vec& normal) const;
+
   const Surface& surface() const { return surface_; }
 
  private:
@@ -76,6 +79,9 @@ class Tree {
   };
 
   void build(std::vector<Item>& items, std::uint32_t begin, std::uint32_t end);
+  // The nearest of the triangles that `takes`, or `best` if none is nearer.
+  template <class Takes>
+  Nearest nearest_of(const Vec& point, Nearest best, const Takes& takes) const;
 
   const Surface& surface_;
   std::vector<Node> nodes_;

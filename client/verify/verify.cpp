@@ -237,7 +237,8 @@ class Verifier {
     count("Edges where a triangle is turned against its neighbour", places[3], true);
   }
 
-  // Normals must point to lower values, as those of the surface do.
+  // Normals must point to lower values, as those of the surface do. Where the surface has both of
+  // its sides within the bound, as a thin wall has, a triangle may face either.
   void check_sides(const std::vector<Nearest>& nearest) {
     const Surface& mesh = mesh_.surface();
     const auto components = components_of(mesh);
@@ -246,8 +247,10 @@ class Verifier {
     std::vector<Vec> inside_out;
     for (std::size_t t = 0; t < nearest.size() && !surface_.surface().triangles.empty(); ++t) {
       const Vec normal = normal_of(mesh.corners(t));
-      const double side = dot(normal, normal_of(surface_.surface().corners(nearest[t].triangle)));
-      if (side < 0) against.push_back(centre_of(mesh.corners(t)));
+      const Vec centre = centre_of(mesh.corners(t));
+      double side = dot(normal, normal_of(surface_.surface().corners(nearest[t].triangle)));
+      if (side < 0 && surface_.has_near(centre, question_.bound, normal)) side = 0;
+      if (side < 0) against.push_back(centre);
       const double sign = side > 0 ? 1 : side < 0 ? -1 : 0;
       area[components[mesh.triangles[t][0]]] += sign * std::sqrt(squared(normal));
     }
