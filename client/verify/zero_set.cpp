@@ -89,22 +89,28 @@ class March {
     std::vector<unsigned> out;
     for (const unsigned c : corners) ((inside >> c & 1) != 0 ? in : out).push_back(c);
     if (in.empty() || out.empty()) return;
+    // Where a point is at a corner, as on a cap, a triangle can lie in a face of the tetrahedron:
+    // then only some of its corners are beside the triangle.
+    Vec outwards = {0, 0, 0};
+    for (const unsigned inner : in) {
+      for (const unsigned outer : out) outwards = outwards + (place(outer) - place(inner));
+    }
     Indices first = {crossing(in[0], out[0]), 0, 0};
     if (in.size() == 2) {
       first = {first[0], crossing(in[0], out[1]), crossing(in[1], out[1])};
-      add({first[0], first[2], crossing(in[1], out[0])}, in[0], out[0]);
+      add({first[0], first[2], crossing(in[1], out[0])}, outwards);
     } else {
       for (std::size_t n = 1; n < 3; ++n) {
         first[n] = in.size() == 1 ? crossing(in[0], out[n]) : crossing(in[n], out[0]);
       }
     }
-    add(first, in[0], out[0]);
+    add(first, outwards);
   }
 
-  void add(Indices triangle, unsigned inside, unsigned outside) {
+  void add(const Indices& triangle, const Vec& outwards) {
     surface_.triangles.push_back(triangle);
     const Vec normal = normal_of(surface_.corners(surface_.triangles.size() - 1));
-    if (dot(normal, place(outside) - place(inside)) >= 0) return;
+    if (dot(normal, outwards) >= 0) return;
     std::swap(surface_.triangles.back()[1], surface_.triangles.back()[2]);
   }
 

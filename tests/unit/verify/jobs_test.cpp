@@ -78,6 +78,22 @@ TEST(Verify, AcceptsJobsOfSamplesAtTheIsoValue) {
   }
 }
 
+// Samples at the iso-value make walls without thickness: both of their sides are near.
+TEST(Verify, AcceptsJobsOfThinWalls) {
+  MeshParameters parameters = parameters_within(0.1);
+  expect_right(noise<float>({-1, 0, 1}, {9, 9, 7}, 3192), parameters);
+  parameters.scheme = SchemeName::kFive;
+  expect_right(noise<float>({-1, 0, 1}, {7, 7, 5}, 1768), parameters);
+}
+
+// Corners of caps are at samples.
+TEST(Verify, AcceptsCapsOfSmallCavities) {
+  MeshParameters parameters = parameters_within(0.05);
+  parameters.close = true;
+  parameters.scheme = SchemeName::kFive;
+  expect_right(noise_between<float>(-1, 1.5, {2, 6, 9}, 13263), parameters);
+}
+
 TEST(Verify, RejectsTheSurfaceOfAnotherField) {
   MeshParameters parameters = parameters_within(0.05);
   const verify::Surface mesh = verify::read_surface(made(balls(), parameters));
