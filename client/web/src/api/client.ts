@@ -130,6 +130,11 @@ export class Client {
     return this.connection.blob(`${volumePath(id)}/slice.png${queryOf({ axis, index, window: window.join() })}`, { signal });
   }
 
+  /** The samples of a slice in the volume's own type, row by row, little-endian. */
+  samplesOfSlice(id: string, axis: Axis, index: number, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
+    return this.connection.bytes(`${volumePath(id)}/slice${queryOf({ axis, index })}`, { signal });
+  }
+
   /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     return this.connection.bytes(`${volumePath(id)}/preview${queryOf({ size, window: window.join() })}`, { signal });

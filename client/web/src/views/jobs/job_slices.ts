@@ -9,7 +9,6 @@ import { Scope } from '../../ui/signal';
 import { cssColour } from '../../ui/theme';
 import { cursorOfText, sampleAt } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
-import { isInteger } from '../../volume/names';
 import { SliceSource } from '../../volume/slices';
 import type { SurfacePane } from '../surface/surface_pane';
 import { SliceView, type SliceHost } from '../slices/slice_view';
@@ -42,7 +41,7 @@ class JobSlices {
     };
     const host: SliceHost = {
       volume,
-      source: new SliceSource(volume, scope.signal),
+      source: new SliceSource(volume, scope),
       commonWindow: common,
       state: () => ({ iso, labels: this.labels.look(), window, cursor: this.cursor }),
       setWindow: (next) => {
@@ -51,7 +50,6 @@ class JobSlices {
       },
       setCursor: (cursor) => this.goTo(cursor),
       setIso: () => undefined,
-      isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
       crop: null,
       measures: null,

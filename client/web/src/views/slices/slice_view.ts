@@ -45,7 +45,6 @@ export interface SliceHost {
   setWindow: (window: Window) => void;
   setCursor: (cursor: Vec3) => void;
   setIso: (iso: number) => void;
-  isInteger: boolean;
   contourColour: () => string;
   // Null where nothing can be cropped.
   crop: CropHost | null;
@@ -108,7 +107,7 @@ export class SliceView {
     this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop?.grip].filter((grip) => grip != null);
     this.readout = new SliceReadout({
       volume: host.volume,
-      isInteger: host.isInteger,
+      exact: host.source.exact,
       slice: () => this.loader.slice,
       slabOf: ({ axis, index }) => host.layers?.projected(axis, index) ?? null,
       labels: () => host.state().labels,
@@ -128,7 +127,7 @@ export class SliceView {
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
-    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes, host.oblique?.changes]) {
+    for (const look of [host.source.exact.changes, labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes, host.oblique?.changes]) {
       if (look) scope.onEnd(look.subscribe(() => this.draw()));
     }
   }
@@ -263,7 +262,9 @@ export class SliceView {
   }
 
   private measured(index: number): ReturnType<SliceMeasures['textsOf']> | undefined {
-    return this.host.measures?.textsOf(this.host.volume, this.layout, index);
+    const { measures, source, volume } = this.host;
+    const { normal } = this.layout;
+    return measures?.textsOf(volume, this.layout, index, () => (this.host.state().labels ? null : source.exact.find(normal, index)));
   }
 
   // Whether the click was one of a measurement.
@@ -344,8 +345,8 @@ export class SliceView {
   private listenToValues(): void {
     const { canvas, scope } = this;
     const take = (place: Vec3 | null): void => {
-      const { value } = this.readout.valueAt(place);
-      if (value !== null) this.host.setIso(value);
+      if (!place || this.host.state().labels) return;
+      this.host.source.exact.read(this.layout.normal, place).then(this.host.setIso, (error: unknown) => this.host.onError(error));
     };
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
       if (event.pointerType === 'mouse') this.readout.point(this.sampleAt(event), this.host.state().cursor);
