@@ -14,6 +14,7 @@ import type {
   Histogram,
   Job,
   JobList,
+  JobReport,
   JobRequest,
   JobState,
   LabelSummary,
@@ -176,9 +177,9 @@ export class Client {
     return follow(this, id, signal, onChange);
   }
 
-  /** Lists the newest first, in pages of at most 1000: all jobs, or those in one state. */
-  listJobs(cursor = '', { state, limit }: { state?: JobState; limit?: number } = {}): Promise<JobList> {
-    return this.connection.json(`/v1/jobs${queryOf({ state, limit, cursor })}`);
+  /** Lists the newest first, in pages of at most 1000: all jobs, or those in one state, on one volume, or of some days. */
+  listJobs(cursor = '', filter: { state?: JobState; limit?: number; volume?: string; since?: string; until?: string } = {}): Promise<JobList> {
+    return this.connection.json(`/v1/jobs${queryOf({ ...filter, cursor })}`);
   }
 
   /** Returns at once, or with `waitSeconds` when the job has finished or the time is over. */
@@ -195,6 +196,11 @@ export class Client {
       cursor = page.next;
     }
     return labels;
+  }
+
+  /** What a finished job made, of what and how. */
+  reportOf(id: string, signal?: GlobalAbortSignal): Promise<JobReport> {
+    return this.connection.json(`${jobPath(id)}/report`, { signal });
   }
 
   /** Erases a job that has ended, and its files. */

@@ -1,7 +1,7 @@
 // Three slices beside a surface, through the place that was clicked on it.
 import { client } from '../../client';
-import type { Job, Vec3, Volume } from '../../api/types';
-import type { LabelState } from '../../job/labels';
+import type { Job, Label, Vec3, Volume, VolumeLabels } from '../../api/types';
+import { middleOf, type LabelState } from '../../job/labels';
 import { h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { noteInAddress } from '../../ui/route';
@@ -21,6 +21,7 @@ class JobSlices {
   onCursor: ((cursor: Vec3) => void) | null = null;
   cursor: Vec3;
   private views: SliceView[] = [];
+  private places: Promise<VolumeLabels> | null = null;
 
   constructor(
     private readonly volume: Volume,
@@ -70,6 +71,12 @@ class JobSlices {
     this.onCursor?.(cursor);
   }
 
+  async goToLabel(label: Label, background: number): Promise<void> {
+    this.places ??= client.labelsOf(this.volume.id, background);
+    const found = (await this.places).labels.find((one) => one.label === label);
+    if (found) this.goTo(middleOf(found));
+  }
+
   // In millimetres.
   goToPoint(point: Vec3): void {
     this.goTo(sampleAt(this.volume, point));
@@ -97,6 +104,9 @@ export class SlicesBeside {
       noteInAddress({ at: cursor.join(',') });
     };
     scope.onEnd(() => this.shown?.end());
+    scope.onEnd(labels.chosen.subscribe((label) => {
+      if (this.shown && label !== null) this.slices.goToLabel(label, job.parameters.background ?? 0).catch(tellError);
+    }));
   }
 
   linkTo(pane: SurfacePane): void {

@@ -25,6 +25,7 @@ import { CropControl } from './crop_control';
 import { estimateTexts, simplifiedInWords } from './estimate_texts';
 import { HistogramView } from './histogram_view';
 import { IsoField } from './iso_field';
+import { isoPresets } from './iso_presets';
 import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
@@ -207,7 +208,7 @@ class Prepare {
     this.isoPart.hidden = byLabels;
     this.labelPart.hidden = !byLabels;
     if (byLabels && !this.labelChoice) {
-      this.labelChoice = new LabelChoice(this.scope, this.volume, this.parameters, (choice) => this.setLabels(choice), () => this.update());
+      this.labelChoice = new LabelChoice(this.scope, this.volume, this.parameters, (choice) => this.setLabels(choice), () => this.update(), (place) => this.setCursor(place));
       this.labelPart.append(this.labelChoice.element);
     }
     this.faulty.clear();
@@ -314,15 +315,7 @@ class Prepare {
   }
 
   private isoRow(): HTMLElement {
-    const { suggested_iso: otsu, presets } = this.volume;
-    const span = spanOf(this.volume);
-    const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
-      button(`${name} ${formatValue(iso, span)}`, () => this.setIso(shortened(iso, span)), { class: 'chip' }),
-    );
-    return h('div.iso-row', [
-      this.isoField.element,
-      h('div.presets', { role: 'group', 'aria-label': 'Presets' }, ...chips),
-    ]);
+    return h('div.iso-row', this.isoField.element, isoPresets(this.volume, () => this.iso, (iso) => this.setIso(iso)));
   }
 
   private setIso(iso: number): void {
