@@ -2,7 +2,7 @@
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels } from './seen';
-import { ballNrrd, boxOf, noted, nrrdHeader, openedJob, settled, setup } from './support';
+import { ballNrrd, boxOf, drag, noted, nrrdHeader, openedJob, settled, setup } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -109,6 +109,21 @@ describe('a slice', () => {
     expect(await page.locator('.slice-profile figcaption').innerText()).toContain('greatest 1\u202f200');
     await canvas.press('i');
     await expect.poll(() => noted(page, 'iso')).toBe('1200');
+  });
+
+  it('has lines whose crossing can be dragged, and a window elsewhere', async ({ page }) => {
+    await open(page, '&at=24,24,24');
+    const box = await boxOf(page.locator('[data-plane=axial] canvas'));
+    const scale = (Math.min(box.width, box.height) - 28) / 48;
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    const before = noted(page, 'window');
+    await drag(page, [x, y], [x + 6 * scale, y + 3 * scale]);
+    await expect.poll(() => noted(page, 'at')).not.toBe('24,24,24');
+    const [i = 0, j = 0, k] = noted(page, 'at').split(',').map(Number);
+    expect([Math.abs(Math.abs(i - 24) - 6) <= 1, Math.abs(Math.abs(j - 24) - 3) <= 1, k]).toEqual([true, true, 24]);
+    expect(noted(page, 'window')).toBe(before);
+    await drag(page, [x - 60, y - 60], [x - 20, y - 60]);
+    await expect.poll(() => noted(page, 'window')).not.toBe(before);
   });
 
   it('moves by the distance of a wheel, also of a trackpad', async ({ page }) => {

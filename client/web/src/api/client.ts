@@ -240,6 +240,15 @@ export class Client {
     return this.connection.json(`/v1/orders${queryOf({ state, cursor })}`, { signal });
   }
 
+  /** Orders a mesh of a series by a rule of the server, or by none with its usual parameters. */
+  placeOrder(source: { pacs: string; study: string; series: string }, rule?: string): Promise<Order> {
+    return this.connection.json('/v1/orders', {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', 'Idempotency-Key': randomKey() },
+      body: JSON.stringify({ source, rule }),
+    });
+  }
+
   cancelOrder(id: string): Promise<Order> {
     return this.connection.json(orderPath(id), { method: 'DELETE' });
   }

@@ -2,7 +2,7 @@
 import { stages } from '../../../generated/parameters';
 import { client } from '../../client';
 import { asApiError, errorOfProblem } from '../../api/problem';
-import { isFinal, type Job, type JobParameters, type Volume } from '../../api/types';
+import { isFinal, type Job, type Volume } from '../../api/types';
 import { emptyReason } from '../../job/empty';
 import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords } from '../../job/parameters';

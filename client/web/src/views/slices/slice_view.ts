@@ -10,7 +10,7 @@ import { labelImage, labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
 import { paintLetters, pixelsIn, sliceColours, sliceSpace } from './slice_looks';
 import type { ObliqueView } from './oblique_view';
-import type { SliceGrip, Spot } from './slice_grip';
+import { SliceGrip, type Spot } from './slice_grip';
 import type { SliceLayers } from './slice_layers';
 import type { SliceMeasures } from './slice_measure';
 import { SliceReadout } from './slice_readout';
@@ -69,6 +69,8 @@ const titles: Record<Plane, string> = { axial: 'Axial', coronal: 'Coronal', sagi
 const padding = 14;
 // How much is seen of a slice that stands in for one that is not there yet.
 const otherSlice = 0.35;
+// How near a pointer must be to the place where the lines meet, in pixels.
+const crossReach = 7;
 const cropColour = '#f2b33d';
 
 export class SliceView {
@@ -104,7 +106,7 @@ export class SliceView {
     this.slider.disabled = this.count(this.layout.normal) === 1;
     this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
     this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
-    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop?.grip].filter((grip) => grip != null);
+    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop?.grip, this.crossGrip()].filter((grip) => grip != null);
     this.readout = new SliceReadout({
       volume: host.volume,
       exact: host.source.exact,
@@ -169,6 +171,22 @@ export class SliceView {
     const edge = padding * (width / (clientWidth || 1));
     const whole = slicePlacement(this.host.volume, this.layout, { width, height, edge });
     return this.zoom.zoom.placed(whole, width, height);
+  }
+
+  // The place where the lines meet; not while points of a measurement are clicked.
+  private crossGrip(): SliceGrip<true> {
+    const [column, row] = pictureAxes(this.layout.normal);
+    const isNear = ({ place: [x, y], pixels: [wide, high], isTouch }: Spot): boolean => {
+      const { cursor } = this.host.state();
+      return !isTouch && !this.host.measures?.kind.value && Math.hypot((x - cursor[column]) * wide, (y - cursor[row]) * high) < crossReach;
+    };
+    return new SliceGrip((spot) => isNear(spot) || null, (_, place) => {
+      const cursor: Vec3 = [...this.host.state().cursor];
+      for (const [at, axis] of [column, row].entries()) {
+        cursor[axis] = Math.max(0, Math.min(this.host.volume.dims[axis] - 1, Math.round(place[at as 0])));
+      }
+      this.host.setCursor(cursor);
+    });
   }
 
   private draw(): void {
