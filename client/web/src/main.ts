@@ -49,7 +49,7 @@ function placeOf(route: Route): Place {
   }
   return {
     title: 'Not found',
-    show: () => Promise.reject(new ApiError(404, 'Not found', 'No page has this address.')),
+    show: () => Promise.reject(new ApiError(-1, 'Not found', 'No page has this address.')),
   };
 }
 

@@ -181,8 +181,7 @@ function showSurface(
     section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),
     accuracy(job) ?? '',
     times,
-    downloads(job, volume, () => openReport(job, () => pane.pictures())),
-    ...(mesh.empty ? [] : [quality(job, mesh)]),
+    ...(mesh.empty ? [] : [downloads(job, volume, () => openReport(job, () => pane.pictures())), quality(job, mesh)]),
     compareSection(job),
     againSection(job),
   );

@@ -34,7 +34,7 @@ function change(before: number, after: number): string {
   if (before === 0) return '';
   const percent = (100 * (after - before)) / Math.abs(before);
   const sign = percent > 0 ? '+' : '';
-  return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)} %)`;
+  return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)}\u00a0%)`;
 }
 
 function sized(value: number, unit: string): string {

@@ -22,10 +22,10 @@ export function sliceProfile(volume: Volume, measures: SliceMeasures, exact: Exa
     const [least, greatest] = [Math.min(...values), Math.max(...values)];
     const at = (value: number, place: number): string =>
       `${(width * place) / (values.length - 1)},${height - (height * (value - least)) / (greatest - least || 1)}`;
-    const said = `From ${formatValue(values[0] ?? NaN)} to ${formatValue(values.at(-1) ?? NaN)}, least ${formatValue(least)}, greatest ${formatValue(greatest)}`;
+    const said = `Profile along the last length: least ${formatValue(least)}, greatest ${formatValue(greatest)}`;
     element.replaceChildren(
-      svg('svg', { viewBox: `0 -2 ${width} ${height + 4}`, preserveAspectRatio: 'none', role: 'img', 'aria-label': `Profile: ${said}` }, svg('polyline', { points: values.map(at).join(' ') })),
-      h('figcaption.hint', `Profile along the last length. ${said}.`),
+      svg('svg', { viewBox: `0 -2 ${width} ${height + 4}`, preserveAspectRatio: 'none', role: 'img', 'aria-label': said }, svg('polyline', { points: values.map(at).join(' ') })),
+      h('figcaption.hint', `${said}.`),
     );
   };
   const update = (): void => void show().catch(() => (element.hidden = true)); // The slices say what fails.
