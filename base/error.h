@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -49,11 +51,33 @@ struct FieldError {
   bool operator==(const FieldError&) const = default;
 };
 
+// A small grey picture, with a byte for each pixel, row by row, in base64.
+struct ChoicePicture {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::string grey = {};
+
+  bool operator==(const ChoicePicture&) const = default;
+};
+
+// What tells series apart, in DICOM's forms; empty where a file does not say.
+struct SeriesFacts {
+  std::string patient_name = {};
+  std::string patient_id = {};
+  std::string study_uid = {};
+  std::string study_description = {};
+  std::string study_date = {};
+  std::optional<ChoicePicture> picture = {};
+
+  bool operator==(const SeriesFacts&) const = default;
+};
+
 // A parameter that resolves an ambiguous request.
 struct Choice {
   std::string parameter;
   std::string value;
-  std::string title;  // of this choice, for a person
+  std::string title;                       // of this choice, for a person
+  std::optional<SeriesFacts> series = {};  // of DICOM images
 
   bool operator==(const Choice&) const = default;
 };

@@ -306,10 +306,30 @@ void visit(Is<FieldError> auto& self, auto&& field) {
   field("message", self.message);
 }
 
+void visit(Is<ChoicePicture> auto& self, auto&& field) {
+  field("width", self.width);
+  field("height", self.height);
+  field("grey", self.grey);
+}
+
+void visit(Is<SeriesFacts> auto& self, auto&& field) {
+  field("patient_name", self.patient_name);
+  field("patient_id", self.patient_id);
+  field("study_uid", self.study_uid);
+  field("study_description", self.study_description);
+  field("study_date", self.study_date);
+  if (is_told(self, self.picture.has_value())) {
+    field("picture", self.picture);
+  }
+}
+
 void visit(Is<Choice> auto& self, auto&& field) {
   field("parameter", self.parameter);
   field("value", self.value);
   field("title", self.title);
+  if (is_told(self, self.series.has_value())) {
+    field("series", self.series);
+  }
 }
 
 void visit(Is<Problem> auto& self, auto&& field) {

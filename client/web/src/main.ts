@@ -41,6 +41,7 @@ function placeOf(route: Route): Place {
   if (name === 'volumes') return { title: 'New surface', show: async (...of) => (await import('./views/prepare/prepare')).prepareView(...of) };
   if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: async (...of) => (await import('./views/jobs/queue')).queueView(...of) };
   if (name === 'orders') return { title: 'Orders', show: async (...of) => (await import('./views/jobs/orders')).ordersView(...of) };
+  if (name === 'jobs' && route.path[2] === 'report') return { title: 'Report', show: async (...of) => (await import('./views/jobs/report')).reportView(...of) };
   if (name === 'jobs') return { title: 'Surface', show: async (...of) => (await import('./views/jobs/job')).jobView(...of) };
   if (name === 'compare') return { title: 'Compare', show: async (...of) => (await import('./views/compare/compare')).compareView(...of) };
   if (name === 'together') {
@@ -48,7 +49,7 @@ function placeOf(route: Route): Place {
   }
   return {
     title: 'Not found',
-    show: () => Promise.reject(new ApiError(404, 'Not found', 'No page has this address.')),
+    show: () => Promise.reject(new ApiError(-1, 'Not found', 'No page has this address.')),
   };
 }
 

@@ -12,6 +12,7 @@
 #include "proto/presets.h"
 #include "server/import/dicom/choosing/choice.h"
 #include "server/import/dicom/choosing/series.h"
+#include "server/import/dicom/choosing/series_facts.h"
 #include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/placement.h"
@@ -277,6 +278,32 @@ std::optional<ContourGrid> grid_beside(const StructureFile& structures,
   }
 }
 
+Volume import_upload(Upload& upload, const ImportTask& task) {
+  if (const auto* structures = chosen_structures(upload, task.options.series)) {
+    std::vector<Note> notes;
+    const auto grid = grid_beside(*structures, upload.sources, task, notes);
+    Volume volume = import_structures(structures->file.path, grid, task);
+    for (Note& note : notes) add_note(std::move(note), volume);
+    volume.ignored = std::move(upload.ignored);
+    return volume;
+  }
+  const std::vector<Source> sources = choose_series(upload.sources, task.options.series);
+  std::vector<Note> notes = std::move(upload.notes);
+  OpenFile file(sources, task.scratch, task.limits.max_sample_bytes);
+  const Stack stack = stack_of(sources, task, task.options, notes);
+  ignore_left_out(stack, sources, upload);
+  Volume volume = write_volume(stack, describe_volume(stack), file, task);
+  suggest(stack, volume);
+  volume.ignored = std::move(upload.ignored);
+  for (Note& note : notes) add_note(std::move(note), volume);
+  if (are_labels(stack)) {
+    if (auto note = note_on_shares(stack)) volume.notes.push_back(std::move(*note));
+  }
+  volume.dicom = identify(stack, sources, file.data());
+  if (!volume.dicom->series_description.empty()) volume.name = volume.dicom->series_description;
+  return volume;
+}
+
 }  // namespace
 }  // namespace dicom
 
@@ -285,30 +312,12 @@ bool is_dicom(std::string_view head) { return dicom::find_beginning(head).has_va
 Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;
   dicom::Upload upload = dicom::read_headers(files, task.scratch, most_sample_bytes);
-  if (const auto* structures = chosen_structures(upload, task.options.series)) {
-    std::vector<Note> notes;
-    const auto grid = dicom::grid_beside(*structures, upload.sources, task, notes);
-    Volume volume = import_structures(structures->file.path, grid, task);
-    for (Note& note : notes) dicom::add_note(std::move(note), volume);
-    volume.ignored = std::move(upload.ignored);
-    return volume;
+  try {
+    return dicom::import_upload(upload, task);
+  } catch (const Error& error) {
+    if (error.remedy().choices.empty()) throw;
+    throw dicom::with_series_facts(error, upload.sources, task.scratch, most_sample_bytes);
   }
-  const std::vector<dicom::Source> sources =
-      choose_series(std::move(upload.sources), task.options.series);
-  std::vector<Note> notes = std::move(upload.notes);
-  dicom::OpenFile file(sources, task.scratch, most_sample_bytes);
-  const dicom::Stack stack = dicom::stack_of(sources, task, task.options, notes);
-  dicom::ignore_left_out(stack, sources, upload);
-  Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
-  dicom::suggest(stack, volume);
-  volume.ignored = std::move(upload.ignored);
-  for (Note& note : notes) dicom::add_note(std::move(note), volume);
-  if (dicom::are_labels(stack)) {
-    if (auto note = dicom::note_on_shares(stack)) volume.notes.push_back(std::move(*note));
-  }
-  volume.dicom = dicom::identify(stack, sources, file.data());
-  if (!volume.dicom->series_description.empty()) volume.name = volume.dicom->series_description;
-  return volume;
 }
 
 MostBytes most_dicom_bytes(const InputFile& beginning, const ImportTask& task) {

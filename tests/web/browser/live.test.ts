@@ -73,22 +73,11 @@ describe('the surface beside the slices', () => {
       const made = WebGL2RenderingContext.prototype;
       // eslint-disable-next-line @typescript-eslint/unbound-method -- called on their contexts below
       const { clientWaitSync } = made;
-      const queue = window.GPUQueue?.prototype;
-      // eslint-disable-next-line @typescript-eslint/unbound-method -- called on their queues below
-      const whenDone = queue?.onSubmittedWorkDone;
       const test = { isHeld: true, drawn: [] as string[] };
       Object.assign(window, { test });
       made.clientWaitSync = function (...given) {
         return test.isHeld ? this.TIMEOUT_EXPIRED : clientWaitSync.apply(this, given);
       };
-      const released = async (): Promise<void> => {
-        while (test.isHeld) await new Promise((resolve) => requestAnimationFrame(resolve));
-      };
-      if (queue)
-        queue.onSubmittedWorkDone = async function () {
-          await released();
-          return whenDone?.apply(this);
-        };
       const cell = document.querySelector<HTMLElement>('.live');
       if (!cell) throw new Error('there is no surface');
       const note = (): number => test.drawn.push(cell.dataset.iso ?? '');

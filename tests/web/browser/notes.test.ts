@@ -188,3 +188,30 @@ describe('a NIfTI file with two forms', () => {
     expect(await note.getByRole('button').count()).toBe(0);
   });
 });
+
+describe('iso-values with names', () => {
+  it('are there for what a person says is a CT, beside a person\'s own', async ({ daemon, page }) => {
+    await page.goto(daemon.url);
+    const values = new Int16Array(8 ** 3).map((_, n) => (n % 2 === 0 ? -1000 : 1000));
+    const header = 'NRRD0004\ntype: int16\ndimension: 3\nsizes: 8 8 8\nspacings: 1 1 1\nendian: little\nencoding: raw\n\n';
+    await drop(page, [{ name: 'unsaid.nrrd', bytes: Buffer.concat([Buffer.from(header), Buffer.from(values.buffer)]) }]);
+    await page.waitForURL(volumePage);
+    const presets = page.getByRole('group', { name: 'Presets' });
+    expect(await presets.getByRole('button', { name: /^bone/ }).count()).toBe(0);
+    const before = page.url();
+    await page.getByRole('button', { name: 'This is a CT in Hounsfield units' }).click();
+    await page.waitForURL((url) => volumePage.test(url.hash) && !before.startsWith(url.href.split('?')[0] ?? ''));
+    await presets.getByRole('button', { name: /^bone/ }).click();
+    await expect.poll(() => page.locator('.iso-input').inputValue()).toBe('250');
+    await page.locator('.iso-input').fill('612');
+    await presets.getByRole('button', { name: 'Save as preset' }).click();
+    await page.getByRole('textbox', { name: 'Name for the iso-value 612' }).fill('cage');
+    await page.keyboard.press('Enter');
+    await page.locator('.iso-input').fill('5');
+    await page.reload();
+    await presets.getByRole('button', { name: 'cage 612' }).click();
+    await expect.poll(() => page.locator('.iso-input').inputValue()).toBe('612');
+    await presets.getByRole('button', { name: 'Remove the preset cage' }).click();
+    await expect.poll(() => presets.getByRole('button', { name: 'cage 612' }).count()).toBe(0);
+  });
+});

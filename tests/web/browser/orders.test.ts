@@ -54,6 +54,15 @@ describe('orders', () => {
     await expect.poll(() => row.locator('td').first().innerText()).toBe('cancelled');
     await expect.poll(() => row.getByRole('button').count()).toBe(0);
 
+    // One that is placed on the page; a rule that there is not is refused in place.
+    await page.getByText('New order').click();
+    for (const [name, text] of [['Study Instance UID', '1.2.3'], ['Series Instance UID', '1.2.3.9'], ['Rule', 'none']] as const) await page.getByLabel(name).fill(text);
+    await page.getByRole('button', { name: 'Place the order' }).click();
+    await expect.poll(() => page.getByRole('alert').innerText()).toContain('rule: is not configured');
+    await page.getByLabel('Rule').fill('bone');
+    await page.getByRole('button', { name: 'Place the order' }).click();
+    await expect.poll(() => page.locator('tr[data-order]', { hasText: '1.2.3.9' }).innerText()).toMatch(/waiting[^]*bone/);
+
     status = 400;
     const { id: failed } = await order('1.2.3.5');
     const other = page.locator(`tr[data-order="${failed}"]`);

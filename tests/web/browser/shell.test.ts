@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import type { Route } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { pixelsOf } from './seen';
-import { ballNrrd, measured, noted, openPage, openSurface, pause, settled, setup, still, withTokens } from './support';
+import { ballNrrd, boxOf, measured, noted, openPage, openSurface, pause, settled, setup, still, withTokens } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -139,5 +139,27 @@ describe('the token', () => {
       await expect.poll(() => page.getByRole('button', { name: 'Enter a token' }).isVisible()).toBe(false);
       await page.close();
     });
+  });
+});
+
+describe('small things', () => {
+  it('stay where they are: help at its beginning, the panel after a change; an unknown address is told as one', async ({ page, daemon }) => {
+    await page.setViewportSize({ width: 1180, height: 420 });
+    await page.goto(`${daemon.url}/#/nowhere`);
+    const refused = page.getByRole('alert').filter({ hasText: 'No page has this address.' });
+    await refused.waitFor();
+    expect(await refused.innerText()).not.toContain('erased');
+    await page.keyboard.press('?');
+    const help = page.getByRole('dialog', { name: 'Keyboard shortcuts' });
+    await help.waitFor();
+    expect(await help.evaluate((dialog) => dialog.scrollHeight > dialog.clientHeight && dialog.scrollTop)).toBe(0);
+    await page.keyboard.press('Escape');
+    const volume = await daemon.upload(ballNrrd(16, 5));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+    const below = page.locator('.slice-controls');
+    const before = await boxOf(below);
+    await page.locator('.iso-input').fill('110');
+    await page.getByRole('button', { name: 'Undo' }).waitFor();
+    expect(await boxOf(below)).toEqual(before);
   });
 });

@@ -2,7 +2,7 @@
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels } from './seen';
-import { ballNrrd, boxOf, noted, nrrdHeader, openedJob, settled, setup } from './support';
+import { ballNrrd, boxOf, drag, noted, nrrdHeader, openedJob, settled, setup } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -88,13 +88,42 @@ describe('a slice', () => {
     const scale = (Math.min(box.width, box.height) - 28) / 48;
     const position = { x: box.width / 2 + 13.5 * scale, y: box.height / 2 - 0.5 * scale };
     await canvas.hover({ position });
-    const text = page.locator('[data-plane=axial] .slice-value');
-    await expect.poll(() => text.innerText()).toMatch(/^(about )?\d+/);
-    const told = Number(/[\d.]+/.exec(await text.innerText())?.[0]);
+    const text = page.locator('[data-plane=axial] .slice-reading');
+    await expect.poll(() => text.innerText()).toMatch(/^\d+$/);
+    const told = Number(await text.innerText());
     expect(Math.abs(told - 132)).toBeLessThan(12);
     await canvas.dblclick({ position });
     await expect.poll(() => noted(page, 'iso')).toBe(String(told));
     await expect.poll(() => page.locator('.iso-input').inputValue()).toBe(String(told));
+  });
+
+  it('has exact values of 16 bits, at the ends of a length, along it and in an area', async ({ page, daemon }) => {
+    const volume = await daemon.upload(insertNrrd(64));
+    const measures = 'length,axial,31,31,31,42,31;area,axial,31,25,25,35,25,35,35,25,35';
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=300&window=-1000,40&at=42,31,31&measured=${measures}`);
+    const canvas = page.locator('[data-plane=axial] canvas');
+    const value = page.locator('[data-plane=axial] .slice-reading');
+    await expect.poll(() => value.innerText()).toBe('1\u202f200');
+    await expect.poll(() => canvas.getAttribute('aria-label')).toContain('11 mm, 40 to 1\u202f200');
+    expect(await canvas.getAttribute('aria-label')).toContain('mean 40, SD 0, 40 to 40');
+    expect(await page.locator('.slice-profile figcaption').innerText()).toContain('greatest 1\u202f200');
+    await canvas.press('i');
+    await expect.poll(() => noted(page, 'iso')).toBe('1200');
+  });
+
+  it('has lines whose crossing can be dragged, and a window elsewhere', async ({ page }) => {
+    await open(page, '&at=24,24,24');
+    const box = await boxOf(page.locator('[data-plane=axial] canvas'));
+    const scale = (Math.min(box.width, box.height) - 28) / 48;
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    const before = noted(page, 'window');
+    await drag(page, [x, y], [x + 6 * scale, y + 3 * scale]);
+    await expect.poll(() => noted(page, 'at')).not.toBe('24,24,24');
+    const [i = 0, j = 0, k] = noted(page, 'at').split(',').map(Number);
+    expect([Math.abs(Math.abs(i - 24) - 6) <= 1, Math.abs(Math.abs(j - 24) - 3) <= 1, k]).toEqual([true, true, 24]);
+    expect(noted(page, 'window')).toBe(before);
+    await drag(page, [x - 60, y - 60], [x - 20, y - 60]);
+    await expect.poll(() => noted(page, 'window')).not.toBe(before);
   });
 
   it('moves by the distance of a wheel, also of a trackpad', async ({ page }) => {

@@ -117,10 +117,7 @@ export interface JobAnswer {
   } | null;
 }
 
-// Software draws WebGPU, too. If ISOMESH_WEBGPU is set, all tests of the page use it.
-export const webGpuOptions = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader', '--enable-features=Vulkan', '--use-vulkan=swiftshader'];
-
-export function startBrowser(options = process.env.ISOMESH_WEBGPU === undefined ? [] : webGpuOptions): Promise<Browser> {
+export function startBrowser(): Promise<Browser> {
   return chromium.launch({
     executablePath: fromEnvironment('CHROMIUM'),
     args: [
@@ -131,7 +128,6 @@ export function startBrowser(options = process.env.ISOMESH_WEBGPU === undefined 
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',
-      ...options,
     ],
   });
 }

@@ -11,7 +11,7 @@ describe('surfaces in one scene', () => {
     const jobs = [];
     for (const iso of [70, 200]) jobs.push(await daemon.make({ volume, iso, formats: ['glb'] }));
     await page.goto(`${daemon.url}/#/jobs`);
-    const boxes = page.getByRole('checkbox', { name: /to compare/ });
+    const boxes = page.getByRole('checkbox', { name: /^Choose/ });
     await expect.poll(() => boxes.count()).toBe(2);
     for (const box of await boxes.all()) await box.check();
     await page.getByRole('button', { name: 'Show in one scene' }).click();

@@ -1,4 +1,5 @@
 // Uploads that go on, wait, ask before they send, and are dropped wherever.
+import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync, utimesSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -23,6 +24,16 @@ async function held(page: Page): Promise<{ letGo: () => void; count: () => numbe
     await route.continue();
   });
   return { letGo: () => open(), count: () => count };
+}
+
+function tarOf(files: readonly { name: string; bytes: Buffer }[]): Buffer {
+  const folder = mkdtempSync(join(tmpdir(), 'isomesh-tar-'));
+  try {
+    for (const { name, bytes } of files) writeFileSync(join(folder, name), bytes);
+    return execFileSync('tar', ['-cf', '-', '-C', folder, '.']);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
 }
 
 describe('an upload', () => {
@@ -174,6 +185,13 @@ describe('an upload of several volumes', () => {
     const [first, second] = await groups.allInnerTexts();
     expect(first).toMatch(/Doe Jane[^]*Head, 2024-05-17[^]*thin[^]*thick/);
     expect(second).toMatch(/Doe Joe[^]*Knee[^]*knee/);
+    // The same as one archive, of which the page reads nothing.
+    await page.goto('about:blank');
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'study.tar', bytes: tarOf(slices) }]);
+    await expect.poll(() => groups.allInnerTexts()).toEqual([first, second]);
+    const widths = await groups.locator('canvas').evaluateAll((all) => all.map((canvas) => (canvas as HTMLCanvasElement).width));
+    expect(widths).toEqual([4, 4, 4]);
     await groups.nth(1).getByRole('button').click();
     await page.waitForURL(volumePage);
   });

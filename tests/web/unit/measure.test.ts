@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { angleAt, areaOf, measureText } from '@/volume/measure';
 import { pixelsOf, placeText, windowName } from '@/views/slices/slice_looks';
 import { rounded } from '@/views/slices/slice_readout';
+import { plainValue, profileOf, statisticsIn } from '@/volume/exact';
 import { SliceMeasures } from '@/views/slices/slice_measure';
 import { slicePlane } from '@/volume/geometry';
 import type { Volume } from '@/api/types';
@@ -27,7 +28,7 @@ describe('what is measured in slices', () => {
   it('belongs to its slice, takes the spacing, and is taken back', () => {
     const measures = new SliceMeasures();
     const plane = slicePlane(volume, 'axial');
-    const texts = (index: number): string[] => measures.textsOf(volume, plane, index).map(({ text }) => text);
+    const texts = (index: number): string[] => measures.textsOf(volume, plane, index, () => null).map(({ text }) => text);
     expect(measures.take('axial', 5, [1, 1])).toBe(false);
     measures.kind.value = 'length';
     expect(measures.take('axial', 5, [1, 1])).toBe(true);
@@ -68,13 +69,33 @@ describe('the looks of slices', () => {
 
   it('tell values with the digits that their window needs', () => {
     const window: [number, number] = [1_000_000, 1_000_009];
-    expect(rounded({ low: 1_000_004.47, high: 1_000_004.5 }, window)).toEqual({ text: 'about 1\u202f000\u202f004.49', value: 1_000_004.49 });
-    expect(rounded({ low: -Infinity, high: 1_000_000.02 }, window).text).toBe('at most 1\u202f000\u202f000.02');
-    expect(rounded({ low: 34.2, high: 50.1 }, [-1000, 3000])).toEqual({ text: 'about 40', value: 40 });
+    expect(rounded({ low: 1_000_004.47, high: 1_000_004.5 }, window)).toBe('about 1\u202f000\u202f004.49');
+    expect(rounded({ low: -Infinity, high: 1_000_000.02 }, window)).toBe('at most 1\u202f000\u202f000.02');
+    expect(rounded({ low: 34.2, high: 50.1 }, [-1000, 3000])).toBe('about 40');
   });
 
   it('tell places in either space', () => {
     expect(placeText([1, -2, 3.04], 'LPS', [2, 3, 4])).toBe('LPS 1, \u22122, 3 mm');
     expect(placeText([1, -2, 3.04], 'RAS', [2, 3, 4])).toBe('RAS \u22121, 2, 3 mm');
+  });
+});
+
+describe('exact samples of a slice', () => {
+  // Column plus ten times the row.
+  const slice = { width: 10, height: 10, samples: Int16Array.from({ length: 100 }, (_, at) => at) };
+
+  it('have a profile along a line', () => {
+    expect(profileOf(slice, [[0, 0], [2, 2]])).toEqual([0, 1, 2, 3, 4, 5, 6].map((step) => expect.closeTo((step * 11) / 3) as number));
+  });
+
+  it('have a mean, a deviation and ends within an area', () => {
+    const square = [[0.5, 0.5], [2.5, 0.5], [2.5, 2.5], [0.5, 2.5]] as const;
+    expect(statisticsIn(slice, square)).toEqual({ count: 4, mean: 16.5, deviation: expect.closeTo(Math.sqrt(25.25)) as number, least: 11, greatest: 22 });
+    expect(statisticsIn(slice, square.map(([x, y]) => [x / 10 + 0.3, y / 10 + 0.3] as const))).toBe(null);
+  });
+
+  it('are as short as tells them apart', () => {
+    expect(plainValue(Math.fround(0.1), { samples: new Float32Array(1) })).toBe(0.1);
+    expect(plainValue(0.1 + 0.2, { samples: new Float64Array(1) })).toBe(0.1 + 0.2);
   });
 });

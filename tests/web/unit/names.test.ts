@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Volume } from '@/api/types';
 import { defaultParameters, surfaceInNames } from '@/job/parameters';
 import { fileStem } from '@/volume/names';
-import { onlyInteger, valueIn, type Slice } from '@/volume/slices';
+import { valueIn, type Slice } from '@/volume/slices';
 
 describe('a file that is made of a volume', () => {
   const named = (name: string | null, series = ''): string =>
@@ -32,17 +32,5 @@ describe('a value in a slice', () => {
     expect(valueIn(slice, 1, 0)).toEqual({ low: -49.5, high: -48.5 });
     expect(valueIn(slice, 0, 0)).toEqual({ low: -Infinity, high: -99.5 });
     expect(valueIn(slice, 0, 1)).toEqual({ low: 154.5, high: Infinity });
-  });
-
-  it('is one integer where its range holds no other', () => {
-    expect(onlyInteger({ low: -49.5, high: -48.5 })).toBe(-49);
-    // A step of 1.37, as of a window of 350: some greys stand for one integer, some for two.
-    expect(onlyInteger({ low: 6.2, high: 7.57 })).toBe(7);
-    expect(onlyInteger({ low: 6.9, high: 8.27 })).toBe(null);
-    expect(onlyInteger({ low: 7, high: 8 })).toBe(null);
-    // 50 is drawn as this grey, too: 42.5 is rounded to 43.
-    const tie = { width: 1, height: 1, values: Uint8Array.of(43), window: [0, 300] } as unknown as Slice;
-    expect(onlyInteger(valueIn(tie, 0, 0))).toBe(null);
-    expect(onlyInteger({ low: 154.5, high: Infinity })).toBe(null);
   });
 });

@@ -1,7 +1,6 @@
 import { gzipSync } from 'node:zlib';
 import { describe, expect, it } from 'vitest';
-import type { Picture } from '@/volume/dicom_peek';
-import { readTimePoints } from '@/volume/time_points';
+import { readTimePoints, type Picture } from '@/volume/time_points';
 import { seriesNifti, smallNrrd } from '../browser/files';
 
 async function read(bytes: Buffer, chunk = bytes.length): Promise<Picture[]> {

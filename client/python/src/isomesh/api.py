@@ -874,12 +874,33 @@ class ProblemErrors(TypedDict):
     message: str
 
 
+class ProblemChoicesSeriesPicture(TypedDict):
+    """A slice of the series, of at most 96 x 96 pixels. Only the first 100 series have one."""
+
+    width: int
+    height: int
+    #: A byte for each pixel, row by row, in base64.
+    grey: str
+
+
+class ProblemChoicesSeries(TypedDict):
+    """What tells DICOM series apart, in DICOM's forms. Empty where the files do not say."""
+
+    patient_name: str
+    patient_id: str
+    study_uid: str
+    study_description: str
+    study_date: str
+    picture: NotRequired[ProblemChoicesSeriesPicture]
+
+
 class ProblemChoices(TypedDict):
     #: The query parameter to add.
     parameter: Literal['series', 'member', 'volume', 'spacing']
     value: str
     #: A description of the value, for people.
     title: str
+    series: NotRequired[ProblemChoicesSeries]
 
 
 class Problem(TypedDict):

@@ -14,6 +14,7 @@ import type {
   Histogram,
   Job,
   JobList,
+  JobReport,
   JobRequest,
   JobState,
   LabelSummary,
@@ -130,6 +131,11 @@ export class Client {
     return this.connection.blob(`${volumePath(id)}/slice.png${queryOf({ axis, index, window: window.join() })}`, { signal });
   }
 
+  /** The samples of a slice in the volume's own type, row by row, little-endian. */
+  samplesOfSlice(id: string, axis: Axis, index: number, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
+    return this.connection.bytes(`${volumePath(id)}/slice${queryOf({ axis, index })}`, { signal });
+  }
+
   /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     return this.connection.bytes(`${volumePath(id)}/preview${queryOf({ size, window: window.join() })}`, { signal });
@@ -171,9 +177,9 @@ export class Client {
     return follow(this, id, signal, onChange);
   }
 
-  /** Lists the newest first, in pages of at most 1000: all jobs, or those in one state. */
-  listJobs(cursor = '', { state, limit }: { state?: JobState; limit?: number } = {}): Promise<JobList> {
-    return this.connection.json(`/v1/jobs${queryOf({ state, limit, cursor })}`);
+  /** Lists the newest first, in pages of at most 1000: all jobs, or those in one state, on one volume, or of some days. */
+  listJobs(cursor = '', filter: { state?: JobState; limit?: number; volume?: string; since?: string; until?: string } = {}): Promise<JobList> {
+    return this.connection.json(`/v1/jobs${queryOf({ ...filter, cursor })}`);
   }
 
   /** Returns at once, or with `waitSeconds` when the job has finished or the time is over. */
@@ -190,6 +196,11 @@ export class Client {
       cursor = page.next;
     }
     return labels;
+  }
+
+  /** What a finished job made, of what and how. */
+  reportOf(id: string, signal?: GlobalAbortSignal): Promise<JobReport> {
+    return this.connection.json(`${jobPath(id)}/report`, { signal });
   }
 
   /** Erases a job that has ended, and its files. */
@@ -227,6 +238,15 @@ export class Client {
   /** Lists the newest first, in pages. An empty state lists all. */
   listOrders(state: OrderState | '', cursor = '', signal?: GlobalAbortSignal): Promise<OrderList> {
     return this.connection.json(`/v1/orders${queryOf({ state, cursor })}`, { signal });
+  }
+
+  /** Orders a mesh of a series by a rule of the server, or by none with its usual parameters. */
+  placeOrder(source: { pacs: string; study: string; series: string }, rule?: string): Promise<Order> {
+    return this.connection.json('/v1/orders', {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', 'Idempotency-Key': randomKey() },
+      body: JSON.stringify({ source, rule }),
+    });
   }
 
   cancelOrder(id: string): Promise<Order> {

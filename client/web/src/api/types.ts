@@ -37,6 +37,7 @@ export type Priority = Schemas['Priority'];
 export type JobRequest = Schemas['JobRequest'];
 export type Job = Schemas['Job'];
 export type JobList = Schemas['JobList'];
+export type JobReport = Schemas['JobReport'];
 export type JobChange = Schemas['AnyJobEvent'];
 // All parameters, as a job has them. A request may name only some.
 export type JobParameters = Job['parameters'];

@@ -1,6 +1,6 @@
 // The labels of a job's mesh as a person looks at them: which are shown, and in which colours.
 import { client } from '../client';
-import type { Estimate, Job, Label, LabelSummary, Volume } from '../api/types';
+import type { Estimate, Job, Label, LabelSummary, Vec3, Volume, VolumeLabel } from '../api/types';
 import { Signal } from '../ui/signal';
 import { LabelMap, seriesColour, type LabelLook } from '../volume/label_map';
 
@@ -66,6 +66,11 @@ export function isRenumbered({ notes }: Volume): boolean {
   return notes.some(({ code }) => code === 'labels-renumbered');
 }
 
+// The sample in the middle of the box around a label.
+export function middleOf({ low, high }: Pick<VolumeLabel, 'low' | 'high'>): Vec3 {
+  return [0, 1, 2].map((axis) => Math.round(((low[axis] ?? 0) + (high[axis] ?? 0)) / 2)) as Vec3;
+}
+
 // The triangles of each label's surface.
 export function trianglesOf(estimate: Estimate): ReadonlyMap<Label, number> {
   return new Map((estimate.labels ?? []).map(({ label, triangles }) => [label, triangles]));
@@ -76,6 +81,8 @@ export class LabelState {
   // The colours that a person chose or the file has; the others' are known once their surfaces come.
   readonly colours = new Signal<ReadonlyMap<Label, string>>(new Map());
   readonly picked = new Signal<LabelSummary | null>(null);
+  // The last one of the list that was chosen, to which slices move.
+  readonly chosen = new Signal<Label | null>(null);
   private map: LabelMap | null = null;
   private readonly byLabel: ReadonlyMap<Label, LabelSummary>;
 

@@ -44,6 +44,19 @@ export async function eraseJob(job: Job): Promise<boolean> {
   }
 }
 
+// Asks once for all. Calls back with each that was erased; those that the server keeps stay.
+export async function eraseJobs(ids: readonly string[], onErased: (id: string) => void): Promise<void> {
+  if (!(await ask(`Erase ${ids.length} jobs?`, 'The jobs and their files will be removed from the server. The volumes stay.', 'Erase'))) return;
+  try {
+    for (const id of ids) {
+      await client.eraseJob(id);
+      onErased(id);
+    }
+  } catch (error) {
+    tellError(error);
+  }
+}
+
 // The file name of a surface: head-iso-60.glb.
 export function fileNameOf(job: Job, volume: Volume | null, suffix: string): string {
   return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surfaceInNames(job.parameters)}${suffix}`;

@@ -6,7 +6,6 @@ import type { Vec3 } from '../api/types';
 import { firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
 import { verticalAngle } from './camera';
 import { GlPainter } from './live_gl';
-import { GpuPainter } from './live_gpu';
 import { placeOfSamples, type LivePainter, type LivePicture, type LiveScene } from './live_painter';
 import type { Look } from '../volume/looks';
 import { onTap } from './tap';
@@ -40,8 +39,6 @@ export class LiveSurface {
   // Software draws: coarser volumes do.
   readonly isSoftware: boolean;
   onFrame: ((frame: Frame) => void) | null = null;
-  // It can paint no more; another one can, without WebGPU.
-  onLost: (() => void) | null = null;
   // A click or tap on the surface, in samples of the preview.
   onPick: ((place: Vec3) => void) | null = null;
 
@@ -65,20 +62,11 @@ export class LiveSurface {
   // Milliseconds a pixel, of the last frames of each kind; guessed before the first.
   private readonly costs: { moving: number; resting: number };
 
-  // Rejects if the browser has neither WebGPU nor WebGL 2.
-  static async begin(host: HTMLElement, withoutGpu = false): Promise<LiveSurface> {
-    const camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
-    const gpu = withoutGpu ? null : await GpuPainter.begin();
-    return new LiveSurface(host, camera, gpu ?? new GlPainter(camera));
-  }
+  private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
+  private readonly painter: LivePainter = new GlPainter(this.camera);
 
-  private constructor(
-    private readonly host: HTMLElement,
-    private readonly camera: PerspectiveCamera,
-    private readonly painter: LivePainter,
-  ) {
-    host.dataset.painter = painter.name;
-    painter.onLost = () => this.onLost?.();
+  // Throws if the browser has no WebGL 2.
+  constructor(private readonly host: HTMLElement) {
     this.isSoftware = this.painter.isSoftware;
     const guess = this.isSoftware ? 4e-3 : 1e-5;
     this.costs = { moving: guess, resting: 2 * guess };

@@ -85,11 +85,9 @@ function tablesOf(given: Look): Tables {
 }
 
 export class GlPainter implements LivePainter {
-  readonly name = 'webgl2';
   readonly canvas: HTMLCanvasElement;
   readonly isSoftware: boolean;
   readonly ready: Promise<void>;
-  onLost: (() => void) | null = null;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly uniforms = Object.fromEntries(

@@ -1,4 +1,4 @@
-// What a preview shows, and who paints it: WebGPU where the browser has it, WebGL 2 elsewhere. Both walk the same rays.
+// What a preview shows, and who paints it.
 import { Matrix4, Vector3, type PerspectiveCamera } from 'three';
 import type { Look } from '../volume/looks';
 import { blockSize, type Preview } from '../volume/preview';
@@ -35,14 +35,11 @@ export interface LivePicture {
 }
 
 export interface LivePainter {
-  readonly name: 'webgl2' | 'webgpu';
   readonly canvas: HTMLCanvasElement;
   // Software draws.
   readonly isSoftware: boolean;
   // What it paints with is there.
   readonly ready: Promise<void>;
-  // The browser gave up what it paints with.
-  onLost: (() => void) | null;
   // Calls back with true when it is on the canvas, with false if `isOver` ended it.
   paint: (scene: LiveScene, picture: LivePicture, isOver: () => boolean, then: (isWhole: boolean) => void) => void;
   // Keeps what it has of these previews, and lets go the others.

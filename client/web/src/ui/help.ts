@@ -23,12 +23,12 @@ const keys: [string, string][] = [
 
 export function showHelp(): void {
   const dialog = h('dialog.dialog.help', { 'aria-label': 'Keyboard shortcuts' }, [
-    h('h2', 'Keyboard shortcuts'),
+    h('h2', { tabindex: '-1', autofocus: true }, 'Keyboard shortcuts'),
     h('dl', ...keys.flatMap(([key, what]) => [
       h('dt', ...key.split(' ').map((part) => h('kbd', part))),
       h('dd', what),
     ])),
-    h('div.actions', button('Close', () => dialog.close(), { autofocus: true })),
+    h('div.actions', button('Close', () => dialog.close())),
   ]);
   dialog.addEventListener('close', () => dialog.remove());
   document.body.append(dialog);

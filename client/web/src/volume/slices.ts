@@ -2,7 +2,10 @@
 import { client } from '../client';
 import type { Axis, Volume } from '../api/types';
 import { shortened } from '../ui/format';
+import type { Scope } from '../ui/signal';
+import { ExactSamples } from './exact';
 import type { LabelMap } from './label_map';
+import { Nearby } from './nearby';
 
 export type Window = [number, number];
 
@@ -41,43 +44,28 @@ export function sliceKey(axis: Axis, index: number, window: Window, map: LabelMa
 }
 
 export class SliceSource {
-  // The oldest first.
-  private readonly kept = new Map<string, Promise<Slice>>();
-  private readonly made = new Map<string, Slice>();
+  readonly exact: ExactSamples;
+  private readonly slices = new Nearby<Slice>(mostSlices);
 
   constructor(
     private readonly volume: Volume,
-    private readonly signal: AbortSignal,
-  ) {}
+    private readonly scope: Scope,
+  ) {
+    this.exact = new ExactSamples(volume, scope);
+  }
 
   // The slice if it is here already.
   find(axis: Axis, index: number, window: Window, map: LabelMap | null = null): Slice | null {
-    return this.made.get(sliceKey(axis, index, window, map)) ?? null;
+    return this.slices.find(sliceKey(axis, index, window, map));
   }
 
   // With a map the slice has the numbers of its labels, and its window is the first of the map's.
   get(axis: Axis, index: number, window: Window, map: LabelMap | null = null): Promise<Slice> {
-    const key = sliceKey(axis, index, window, map);
-    const found = this.kept.get(key);
-    if (found) {
-      this.kept.delete(key);
-      this.kept.set(key, found);
-      return found;
-    }
-    const slice = map ? this.fetchLabels(axis, index, map) : this.fetch(axis, index, window);
-    this.kept.set(key, slice);
-    slice.then((made) => this.made.set(key, made), () => undefined);
-    slice.catch(() => this.kept.delete(key));
-    for (const oldest of this.kept.keys()) {
-      if (this.kept.size <= mostSlices) break;
-      this.kept.delete(oldest);
-      this.made.delete(oldest);
-    }
-    return slice;
+    return this.slices.get(sliceKey(axis, index, window, map), () => (map ? this.fetchLabels(axis, index, map) : this.fetch(axis, index, window)));
   }
 
   private async fetch(axis: Axis, index: number, window: Window): Promise<Slice> {
-    const samples = await grey(await client.slicePicture(this.volume.id, axis, index, window, this.signal));
+    const samples = await grey(await client.slicePicture(this.volume.id, axis, index, window, this.scope.signal));
     return { axis, index, window, ...samples };
   }
 
@@ -139,14 +127,6 @@ export function valueIn({ window: [low, high], values, width }: Slice, column: n
     low: value === 0 ? -Infinity : middle - step / 2,
     high: value === 255 ? Infinity : middle + step / 2,
   };
-}
-
-// The integer that a sample of integers has; null if the range holds several.
-export function onlyInteger({ low, high }: ValueRange): number | null {
-  // A sample at the end of the range counts as within: both sides round.
-  const rounding = 1e-4 * (high - low);
-  const first = Math.ceil(low - rounding);
-  return first === Math.floor(high + rounding) ? first : null;
 }
 
 // An iso-value in the units of a slice's values.

@@ -3,13 +3,9 @@
 
 import { volumeFormats } from '../../generated/parameters';
 import { ApiError } from '../api/problem';
-import { formatBytes, formatDims } from '../ui/format';
-import { declaredBy } from './declared';
 import type { NamedFile } from './tar';
 
 const headBytes = 1024;
-// Headers of text may be long.
-const textBytes = 16_384;
 // This much of a compressed file certainly holds the first bytes of its contents.
 const packedBytes = 65_536;
 
@@ -102,18 +98,7 @@ function unsent(status: 415 | 422, detail: string): ApiError {
 async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
   if (file.size === 0) return unsent(422, `${path} is empty.`);
   if (!(await mayBeVolume(file, path))) return unsent(415, `The first bytes of ${path} match no supported format.`);
-  const head = await bytesOf(file, textBytes);
-  const declared = declaredBy(head);
-  if (!declared) return null;
-  if (declared.isElsewhere) {
-    return unsent(422, `${path} is a header; its samples are in another file. Choose both files together.`);
-  }
-  if (declared.bytes === null || file.size >= declared.bytes) return null;
-  return unsent(
-    422,
-    `${path} is cut off: its header declares ${formatDims(declared.dims)} samples, so the file should have ` +
-    `${formatBytes(declared.bytes)}, but it has ${formatBytes(file.size)}.`,
-  );
+  return null;
 }
 
 // The same for files that are sent together. A data file beside a header has no known first bytes.

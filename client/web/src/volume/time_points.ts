@@ -1,12 +1,52 @@
 // Pictures of the volumes in a NIfTI file of several, so that a person can choose one before the daemon reads it: the middle slice
 // of each. Reads the file from its beginning on and keeps no more of it than these.
-import { niftiHead, type NiftiHead } from './declared';
-import type { Picture } from './dicom_peek';
+
+export interface Picture {
+  width: number;
+  height: number;
+  grey: Uint8ClampedArray;
+}
 
 const headBytes = 1024;
 const mostSide = 160;
 // As many as the daemon offers.
 const mostVolumes = 1000;
+
+interface NiftiHead {
+  dims: number[];
+  // Where the samples begin.
+  begin: number;
+  // NIfTI's code of their type, and their bits.
+  type: number;
+  bits: number;
+  isLittle: boolean;
+  isElsewhere: boolean;
+}
+
+// Of the first bytes of a NIfTI file, as they are when nothing is compressed. Null where they tell nothing.
+function niftiHead(head: Uint8Array): NiftiHead | null {
+  if (head.length < 352) return null;
+  const view = new DataView(head.buffer, head.byteOffset, head.byteLength);
+  const isLittle = [348, 540].includes(view.getInt32(0, true));
+  const version = view.getInt32(0, isLittle);
+  const isSecond = version === 540;
+  if (![348, 540].includes(version) || head.length < version) return null;
+  const magic = String.fromCharCode(...head.subarray(isSecond ? 4 : 344, isSecond ? 7 : 347));
+  const dimAt = (at: number): number =>
+    isSecond ? Number(view.getBigInt64(16 + 8 * at, isLittle)) : view.getInt16(40 + 2 * at, isLittle);
+  const count = dimAt(0);
+  if (!(count >= 1 && count <= 7)) return null;
+  const dims = Array.from({ length: count }, (_, at) => dimAt(at + 1));
+  if (!dims.every((one) => one > 0)) return null;
+  return {
+    dims,
+    begin: isSecond ? Number(view.getBigInt64(168, isLittle)) : view.getFloat32(108, isLittle),
+    type: view.getInt16(isSecond ? 12 : 70, isLittle),
+    bits: view.getInt16(isSecond ? 14 : 72, isLittle),
+    isLittle,
+    isElsewhere: !magic.startsWith('n+'),
+  };
+}
 
 type Read = (view: DataView, at: number, isLittle: boolean) => number;
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/base64.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/import.h"
 #include "tests/unit/import/archives.h"
@@ -277,9 +278,17 @@ TEST(DicomChoice, IsAskedForWhenThereAreSeveralSeries) {
   const Outcome outcome = import_objects(two_series());
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("2 series"));
-  EXPECT_THAT(outcome.remedy.choices,
-              testing::ElementsAre(Choice{"series", "1.2.3.4", "CT, 6 slices"},
-                                   Choice{"series", "1.2.3.9", "scout, CT, 4 slices"}));
+  ASSERT_EQ(outcome.remedy.choices.size(), 2);
+  const Choice& first = outcome.remedy.choices[0];
+  const Choice& second = outcome.remedy.choices[1];
+  EXPECT_EQ(first.title, "CT, 6 slices");
+  EXPECT_EQ(second.value, "1.2.3.9");
+  EXPECT_EQ(second.title, "scout, CT, 4 slices");
+  // They are shown to a person, who knows them by these.
+  ASSERT_TRUE(first.series && first.series->picture);
+  EXPECT_FALSE(first.series->study_uid.empty());
+  const ChoicePicture& picture = *first.series->picture;
+  EXPECT_EQ(from_base64(picture.grey)->size(), std::size_t{picture.width} * picture.height);
 }
 
 TEST(DicomChoice, TakesTheSeriesThatIsNamed) {

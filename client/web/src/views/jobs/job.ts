@@ -2,22 +2,23 @@
 import { stages } from '../../../generated/parameters';
 import { client } from '../../client';
 import { asApiError, errorOfProblem } from '../../api/problem';
-import { isFinal, type Job, type JobParameters, type Volume } from '../../api/types';
+import { isFinal, type Job, type Volume } from '../../api/types';
 import { emptyReason } from '../../job/empty';
 import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
-import { inWords, surfaceInWords } from '../../job/parameters';
+import { inWords } from '../../job/parameters';
 import { changeLink, eraseJob } from '../../job/variants';
 import { surfaceDrawing } from '../../scene/graphics';
 import { placeOfText } from '../../scene/views';
 import { button, h } from '../../ui/dom';
-import { formatIso, shortId } from '../../ui/format';
+import { shortId } from '../../ui/format';
 import { refusal, tellError } from '../../ui/notices';
 import { go, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { volumeName } from '../../volume/names';
-import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
+import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings, titleOf } from './job_panel';
 import { SlicesBeside } from './job_slices';
 import { printCheck } from './print_check';
+import { openReport } from './report';
 import { LabelList } from '../labels/label_list';
 import { SurfacePane } from '../surface/surface_pane';
 import { cameraNote } from '../surface/view_tools';
@@ -39,15 +40,9 @@ async function volumeOf(job: Job): Promise<Volume | null> {
   }
 }
 
-function titleOf(parameters: JobParameters): string {
-  const { labels, iso } = parameters;
-  if (labels === undefined) return `Surface at ${formatIso(iso ?? 'otsu')}`;
-  return `Surfaces of ${surfaceInWords(parameters)}`;
-}
-
 function head(job: Job, volume: Volume | null): HTMLElement {
   return h('header.panel-head', [
-    h('h1', titleOf(job.parameters)),
+    h('h1', titleOf(job)),
     h('p.of-volume', volume ? volumeName(volume) : 'The volume was erased'),
     h('p', inWords(job.parameters)),
     h('p.links', [
@@ -111,7 +106,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const element = h('div.job', { 'data-state': first.state }, stageArea, panel);
 
   // A tab in the background says how far its job is.
-  const name = [titleOf(first.parameters), volume && volumeName(volume)].filter(Boolean).join(', ');
+  const name = [titleOf(first), volume && volumeName(volume)].filter(Boolean).join(', ');
   const nameTab = (job: Job): void => {
     const far = job.state === 'succeeded' ? '' : job.state === 'running' ? `${Math.round(100 * job.progress)} %: ` : `${job.state}: `;
     element.dataset.title = far + name;
@@ -186,8 +181,7 @@ function showSurface(
     section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),
     accuracy(job) ?? '',
     times,
-    downloads(job, volume),
-    ...(mesh.empty ? [] : [quality(job, mesh)]),
+    ...(mesh.empty ? [] : [downloads(job, volume, () => openReport(job, () => pane.pictures())), quality(job, mesh)]),
     compareSection(job),
     againSection(job),
   );

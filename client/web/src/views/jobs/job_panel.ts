@@ -2,12 +2,13 @@
 import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { changeOf, type Change } from '../../job/changes';
-import { isSameJob, variantOf, withGlb, withShownGlb } from '../../job/parameters';
+import { labelTitle } from '../../job/labels';
+import { isSameJob, surfaceInWords, variantOf, withGlb, withShownGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, javascriptSnippet, librarySnippet, pythonSnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, definitions, h, type Child } from '../../ui/dom';
-import { formatBytes, formatCount, formatNumber, formatSize, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
+import { formatBytes, formatCount, formatIso, formatNumber, formatSize, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
@@ -19,11 +20,21 @@ export function section(title: string, ...children: Child[]): HTMLElement {
   return h('section.panel-section', h('h2', title), ...children);
 }
 
+const mostNamed = 3;
+
+export function titleOf({ parameters, mesh }: Pick<Job, 'parameters' | 'mesh'>): string {
+  const { labels, iso } = parameters;
+  if (labels === undefined) return `Surface at ${formatIso(iso ?? 'otsu')}`;
+  const made = mesh?.labels ?? [];
+  const areNamed = made.length > 0 && made.length <= mostNamed && made.some(({ name }) => name !== null);
+  return `Surfaces of ${areNamed ? made.map(labelTitle).join(', ') : surfaceInWords(parameters)}`;
+}
+
 function change(before: number, after: number): string {
   if (before === 0) return '';
   const percent = (100 * (after - before)) / Math.abs(before);
   const sign = percent > 0 ? '+' : '';
-  return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)} %)`;
+  return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)}\u00a0%)`;
 }
 
 function sized(value: number, unit: string): string {
@@ -121,7 +132,7 @@ export function timings(job: Job, more: Durations = {}): HTMLElement {
   return section('Time', waterfall(stepsOf(job.timing, more), totalOf(job.timing, more)));
 }
 
-export function downloads(job: Job, volume: Volume | null): HTMLElement {
+export function downloads(job: Job, volume: Volume | null, onReport: () => void): HTMLElement {
   const files = job.mesh?.files ?? {};
   const name = (format: string): string => fileNameOf(job, volume, `.${meshFileSuffix(format)}`);
   const missing = meshFormats.filter((format) => !job.parameters.formats.includes(format));
@@ -163,6 +174,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
           button(meshFormatTitle(format), () => void make(format), { class: 'chip' }),
         ),
       ]),
+    h('div.actions', button('Report', onReport, { title: 'One sheet to print or to keep: pictures, numbers, proof, versions, hashes' })),
     exportActions(job, volume),
   );
 }

@@ -1,7 +1,7 @@
 // Three slices beside a surface, through the place that was clicked on it.
 import { client } from '../../client';
-import type { Job, Vec3, Volume } from '../../api/types';
-import type { LabelState } from '../../job/labels';
+import type { Job, Label, Vec3, Volume, VolumeLabels } from '../../api/types';
+import { middleOf, type LabelState } from '../../job/labels';
 import { h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { noteInAddress } from '../../ui/route';
@@ -9,7 +9,6 @@ import { Scope } from '../../ui/signal';
 import { cssColour } from '../../ui/theme';
 import { cursorOfText, sampleAt } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
-import { isInteger } from '../../volume/names';
 import { SliceSource } from '../../volume/slices';
 import type { SurfacePane } from '../surface/surface_pane';
 import { SliceView, type SliceHost } from '../slices/slice_view';
@@ -22,6 +21,7 @@ class JobSlices {
   onCursor: ((cursor: Vec3) => void) | null = null;
   cursor: Vec3;
   private views: SliceView[] = [];
+  private places: Promise<VolumeLabels> | null = null;
 
   constructor(
     private readonly volume: Volume,
@@ -42,7 +42,7 @@ class JobSlices {
     };
     const host: SliceHost = {
       volume,
-      source: new SliceSource(volume, scope.signal),
+      source: new SliceSource(volume, scope),
       commonWindow: common,
       state: () => ({ iso, labels: this.labels.look(), window, cursor: this.cursor }),
       setWindow: (next) => {
@@ -51,7 +51,6 @@ class JobSlices {
       },
       setCursor: (cursor) => this.goTo(cursor),
       setIso: () => undefined,
-      isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
       crop: null,
       measures: null,
@@ -70,6 +69,12 @@ class JobSlices {
     this.cursor = cursor;
     for (const view of this.views) view.update();
     this.onCursor?.(cursor);
+  }
+
+  async goToLabel(label: Label, background: number): Promise<void> {
+    this.places ??= client.labelsOf(this.volume.id, background);
+    const found = (await this.places).labels.find((one) => one.label === label);
+    if (found) this.goTo(middleOf(found));
   }
 
   // In millimetres.
@@ -99,6 +104,9 @@ export class SlicesBeside {
       noteInAddress({ at: cursor.join(',') });
     };
     scope.onEnd(() => this.shown?.end());
+    scope.onEnd(labels.chosen.subscribe((label) => {
+      if (this.shown && label !== null) this.slices.goToLabel(label, job.parameters.background ?? 0).catch(tellError);
+    }));
   }
 
   linkTo(pane: SurfacePane): void {

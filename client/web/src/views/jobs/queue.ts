@@ -3,7 +3,7 @@ import { client, token } from '../../client';
 import { isFinal, type Job } from '../../api/types';
 import { inOrder, JobList, mostOfState } from '../../job/job_list';
 import { inWords, surfaceInWords } from '../../job/parameters';
-import { eraseJob } from '../../job/variants';
+import { eraseJob, eraseJobs } from '../../job/variants';
 import { button, h } from '../../ui/dom';
 import { formatCount, formatMilliseconds, formatTime, shortId } from '../../ui/format';
 import { tellError } from '../../ui/notices';
@@ -11,6 +11,7 @@ import { go, hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { cell, keepFocus, row, table } from '../../ui/table';
 import { KnownVolumes } from '../../volume/known';
+import { JobFilter } from './job_filter';
 
 const refreshEvery = 1500;
 // Names that are asked for at each refresh.
@@ -47,7 +48,7 @@ function surfaceCell(job: Job, volume: string): HTMLElement {
 }
 
 export async function queueView(scope: Scope, { query }: Route): Promise<HTMLElement> {
-  const queue = new Queue();
+  const queue = new Queue(query);
   await queue.refresh();
   queue.restore((query.get('chosen') ?? '').split(','));
   scope.repeat(refreshEvery, async () => {
@@ -73,12 +74,19 @@ class Queue {
     `More than ${mostOfState} jobs wait. The list has the newest ${mostOfState} of them, without their places.`,
   ]);
   private readonly table = table(columns, unseen, []);
-  private readonly empty = h('p.empty', 'No jobs yet. Choose a volume to begin.');
-  private readonly list = new JobList(client);
+  private readonly empty = h('p.empty');
+  private readonly filter: JobFilter;
+  private list: JobList;
+  private readonly erase = button('Erase', () => void this.eraseChosen(), { class: 'danger', disabled: true });
   private rows = new Map<string, Row>();
   private readonly volumes = new KnownVolumes();
 
-  constructor() {
+  constructor(query: URLSearchParams) {
+    this.filter = new JobFilter(query, () => {
+      this.list = new JobList(this.filter);
+      this.refresh().catch(tellError);
+    }, () => this.show());
+    this.list = new JobList(this.filter);
     this.compare = button('Compare', () => this.goCompare(), { class: 'primary', disabled: true });
     this.together = button('Show in one scene', () => go(['together'], new URLSearchParams({ jobs: [...this.chosen].join(',') })), {
       disabled: true,
@@ -91,7 +99,9 @@ class Queue {
         h('span.hint.grow', 'Stat jobs run first, then routine, then bulk. Within a priority, owners take turns.'),
         this.together,
         this.compare,
+        this.erase,
       ]),
+      this.filter.element,
       this.note,
       this.body,
       h('div.actions', this.more),
@@ -113,7 +123,7 @@ class Queue {
   }
 
   private async showNamed(): Promise<void> {
-    await this.volumes.find(this.ordered().map(({ volume }) => volume), mostNames);
+    await this.volumes.find(this.list.jobs.map(({ volume }) => volume), mostNames);
     this.show();
   }
 
@@ -121,7 +131,8 @@ class Queue {
     const { jobs } = this.list;
     const running = jobs.filter(({ state }) => state === 'running');
     const waiting = inOrder(jobs.filter(({ state }) => state === 'queued'));
-    return [...running, ...waiting, ...jobs.filter(({ state }) => isFinal(state))];
+    const all = [...running, ...waiting, ...jobs.filter(({ state }) => isFinal(state))];
+    return this.filter.shown(all, ({ volume }) => this.volumes.nameOf(volume));
   }
 
   private show(): void {
@@ -131,6 +142,7 @@ class Queue {
     this.more.hidden = this.list.next === null;
     this.note.hidden = this.list.hasWholeQueue;
     this.rows = new Map(rows.map((row) => [row.element.dataset.job ?? '', row]));
+    this.empty.textContent = this.list.jobs.length === 0 && !this.filter.isOn ? 'No jobs yet. Choose a volume to begin.' : 'No job is like that.';
     const shown: Element = rows.length === 0 ? this.empty : this.table;
     if (this.body.firstElementChild !== shown) this.body.replaceChildren(shown);
     keepFocus(this.body, 'job', () => this.arrange(rows.map(({ element }) => element)));
@@ -175,8 +187,8 @@ class Queue {
     const box = h('input', {
       type: 'checkbox',
       checked: this.chosen.has(job.id),
-      disabled: job.state !== 'succeeded',
-      'aria-label': `Choose ${shortId(job.id)} to compare`,
+      disabled: !isFinal(job.state),
+      'aria-label': `Choose ${shortId(job.id)}`,
     });
     box.addEventListener('change', () => this.choose(job.id, box.checked));
     return box;
@@ -199,6 +211,14 @@ class Queue {
     return button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${shortId(job.id)}` });
   }
 
+  private async eraseChosen(): Promise<void> {
+    await eraseJobs([...this.chosen], (id) => {
+      this.list.forget(id);
+      this.choose(id, false);
+    });
+    this.show();
+  }
+
   private choose(id: string, isOn: boolean): void {
     if (isOn) this.chosen.add(id);
     else this.chosen.delete(id);
@@ -209,7 +229,7 @@ class Queue {
 
   // The jobs of the address that are listed and can be shown.
   restore(ids: readonly string[]): void {
-    const listed = this.list.jobs.filter(({ id, state }) => ids.includes(id) && state === 'succeeded');
+    const listed = this.list.jobs.filter(({ id, state }) => ids.includes(id) && isFinal(state));
     if (listed.length === 0) return;
     for (const { id } of listed) this.chosen.add(id);
     this.show();
@@ -218,8 +238,11 @@ class Queue {
 
   private showChosen(): void {
     const { size } = this.chosen;
-    this.together.disabled = size < 2 || size > mostTogether;
-    this.compare.disabled = size < 2 || size > mostCompared;
+    const areMade = this.list.jobs.every(({ id, state }) => state === 'succeeded' || !this.chosen.has(id));
+    this.together.disabled = !areMade || size < 2 || size > mostTogether;
+    this.compare.disabled = !areMade || size < 2 || size > mostCompared;
+    this.erase.disabled = size === 0;
+    this.erase.textContent = size > 0 ? `Erase (${size})` : 'Erase';
     this.compare.textContent = size > 0 ? `Compare (${size})` : 'Compare';
   }
 

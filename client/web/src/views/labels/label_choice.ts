@@ -1,8 +1,8 @@
 // The choice of labels to mesh: all labels of a volume, or some of a list.
 import { client } from '../../client';
 import { asApiError } from '../../api/problem';
-import type { JobParameters, Label, Volume, VolumeLabel } from '../../api/types';
-import { isRenumbered, labelTitle } from '../../job/labels';
+import type { JobParameters, Label, Vec3, Volume, VolumeLabel } from '../../api/types';
+import { isRenumbered, labelTitle, middleOf } from '../../job/labels';
 import { button, checkbox, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
@@ -41,6 +41,7 @@ export class LabelChoice {
     start: Choice,
     private readonly onChange: (choice: Choice) => void,
     private readonly onLook: () => void,
+    private readonly onPlace: (place: Vec3) => void,
   ) {
     this.background = start.background ?? 0;
     this.element = h('div.label-choice', this.body, opacityControl(), this.backgroundField());
@@ -144,7 +145,9 @@ export class LabelChoice {
     });
     const size = h('span.faint.number');
     const box = {
-      element: h('li', { 'data-label': label.label }, swatchOf(colourOf(label)), check, size),
+      element: h('li', { 'data-label': label.label }, swatchOf(colourOf(label)), check, size, [
+        button('Show', () => this.onPlace(middleOf(label)), { class: 'quiet', 'aria-label': `Show ${labelTitle(label)} in the slices` }),
+      ]),
       input: check.querySelector('input') as HTMLInputElement,
       size,
       voxels: label.voxels,

@@ -1,7 +1,7 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
 import type { Job, LabelSummary, Volume, Label } from '../../api/types';
 import { labelOrders, labelsCsv, labelTitle, type LabelOrder, type LabelState } from '../../job/labels';
-import { fileNameOf } from '../../job/variants';
+import { fileNameOf, makeVariant } from '../../job/variants';
 import { button, checkbox, h, select } from '../../ui/dom';
 import { formatBytes, formatCount, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tellError } from '../../ui/notices';
@@ -56,6 +56,7 @@ export class LabelList {
           (name) => search.sort(labelOrders[name][1]),
           { 'aria-label': 'Order of the labels' },
         ),
+        button('Make what is shown', () => makeVariant(job)({ labels: this.shown }), { title: 'Starts a job of the labels that are shown, in all its formats' }),
         button('Save as CSV', () => this.saveTable(search.found), { title: 'Saves a table of the labels that are found: voxels, volumes, areas, components' }),
       ]),
     ]);
@@ -64,6 +65,11 @@ export class LabelList {
     scope.onEnd(state.hidden.subscribe(() => this.update()));
     scope.onEnd(state.colours.subscribe(() => this.update()));
     scope.onEnd(state.picked.subscribe((picked) => this.markPicked(picked)));
+  }
+
+  private get shown(): [Label, ...Label[]] | 'all' {
+    const [first, ...others] = this.state.labels.map(({ label }) => label).filter((label) => this.state.isShown(label));
+    return first === undefined ? 'all' : [first, ...others];
   }
 
   private rowOf(label: LabelSummary): Row {
@@ -83,6 +89,7 @@ export class LabelList {
       this.state.isolate(label.label);
       // Says its area too, to whoever has no pointer.
       this.state.pick(label.label);
+      this.state.chosen.value = label.label;
     };
     const alone = button('Only', isolate, {
       class: 'quiet',

@@ -18,14 +18,18 @@ function ignoredNote(volume: Volume): HTMLElement | null {
   ]);
 }
 
-// Reads the file once more by the form that was not used, and shows the progress where uploads are.
-function otherFormButton({ id }: Volume, detail: string): HTMLElement | false {
-  const form = otherForm(detail);
-  if (form === null || !uploads.hasFileOf(id)) return false;
-  return button(`Use the ${form}`, () => {
-    uploads.readAgain(id, { nifti_form: form });
+// Reads the file once more with that choice, and shows the progress where uploads are.
+function againButton({ id }: Volume, text: string, choices: Readonly<Record<string, string>>): HTMLElement | false {
+  return uploads.hasFileOf(id) && button(text, () => {
+    uploads.readAgain(id, choices);
     go([]);
   });
+}
+
+// By the form that was not used.
+function otherFormButton(volume: Volume, detail: string): HTMLElement | false {
+  const form = otherForm(detail);
+  return form !== null && againButton(volume, `Use the ${form}`, { nifti_form: form });
 }
 
 // Lists what the server decided or corrected when it read the upload.
@@ -91,7 +95,9 @@ export function sliceHelp(): HTMLElement {
 
 // Its name and what it is.
 export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement {
-  return h('header.about', nameHeading(volume, onRenamed), h('p.facts', factsOf(volume)));
+  // Formats other than DICOM do not say it. Then skin, soft tissue and bone have iso-values with names.
+  const ct = volume.modality === null && againButton(volume, 'This is a CT in Hounsfield units', { modality: 'ct' });
+  return h('header.about', nameHeading(volume, onRenamed), h('p.facts', factsOf(volume)), ct);
 }
 
 // The notes and the skipped files of the upload.

@@ -15,7 +15,7 @@ export class HistogramView {
   private readonly grip = h('span.iso-grip');
   private readonly band = svg('rect.window-band', { y: 0, height: baseline });
   private readonly thumb: HTMLElement;
-  // The visible range. It leaves out outliers, which make most of some volumes' range.
+  // The visible range. It leaves out outliers where they make most of the range.
   private readonly low: number;
   private readonly high: number;
   private readonly step: number;
@@ -28,8 +28,11 @@ export class HistogramView {
     private readonly scope: Scope,
   ) {
     const margin = binWidth(histogram);
-    this.low = Math.max(histogram.range[0], quantile(histogram, 0.0002) - margin);
-    this.high = Math.min(histogram.range[1], quantile(histogram, 0.9998) + margin);
+    const [least, greatest] = histogram.range;
+    const [low, high] = [Math.max(least, quantile(histogram, 0.0002) - margin), Math.min(greatest, quantile(histogram, 0.9998) + margin)];
+    const isMostly = 2 * (high - low) > greatest - least;
+    this.low = isMostly ? least : low;
+    this.high = isMostly ? greatest : high;
     if (!(this.high > this.low)) this.high = this.low + 1;
     this.step = niceStep([this.low, this.high], isInteger);
     const marks = ticks([this.low, this.high], 5);

@@ -54,7 +54,6 @@ export class LiveView {
   private loading: AbortController | null = null;
   private retry = 0;
   private hasFailed = false;
-  private hasLostGpu = false;
   private look: LookName | '' = '';
   private readonly choice: HTMLElement;
   private box: Box | null = null;
@@ -201,9 +200,8 @@ export class LiveView {
     ]);
     if (signal.aborted) return;
     try {
-      this.surface ??= await this.begin(LiveSurface.begin(this.view, this.hasLostGpu), signal);
+      this.surface ??= this.begin(new LiveSurface(this.view));
     } catch {
-      if (signal.aborted) return;
       this.say('This browser cannot draw in 3D (WebGL 2 is missing or off).');
       return;
     }
@@ -220,13 +218,7 @@ export class LiveView {
     return fetchPreview(this.host.volume.id, size, window, signal);
   }
 
-  private async begin(made: Promise<LiveSurface>, signal: AbortSignal): Promise<LiveSurface> {
-    const surface = await made;
-    if (signal.aborted) {
-      surface.dispose();
-      signal.throwIfAborted();
-    }
-    surface.onLost = () => this.begunAnew();
+  private begin(surface: LiveSurface): LiveSurface {
     surface.onFrame = ({ took, scale, isResting, iso }) => {
       this.element.dataset.iso = String(iso);
       this.element.dataset.took = took.toFixed(1);
@@ -238,14 +230,6 @@ export class LiveView {
     surface.onPick = (place) => this.host.setCursor(this.inVolume(place));
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     return surface;
-  }
-
-  // Without WebGPU, which the browser gave up.
-  private begunAnew(): void {
-    this.hasLostGpu = true;
-    this.surface?.dispose();
-    this.surface = null;
-    if (!this.scope.isOver) this.load();
   }
 
   private take(preview: Preview): void {

@@ -8,14 +8,12 @@ const most = 3;
 
 export function madeSurfaces(volumeId: string): HTMLElement {
   const element = h('div.made');
-  // So that jobs without a surface take no place of the page.
-  client.listJobs('', { state: 'succeeded' }).then(
-    ({ jobs }) => {
-      const made = jobs.filter(({ volume, mesh }) => volume === volumeId && mesh).slice(0, most);
+  client.listJobs('', { state: 'succeeded', volume: volumeId, limit: most }).then(
+    ({ jobs: made, next }) => {
       if (made.length === 0) return;
       const item = ({ id, parameters }: (typeof made)[number]): HTMLElement =>
         h('li', h('a', { href: hashOf(['jobs', id]) }, surfaceInWords(parameters)), ` ${inWords(parameters)}`);
-      element.replaceChildren(h('h2', 'Surfaces of this volume'), h('ul', ...made.map(item)));
+      element.replaceChildren(h('h2', 'Surfaces of this volume'), h('ul', ...made.map(item)), next === null ? '' : h('a', { href: hashOf(['jobs'], new URLSearchParams({ volume: volumeId })) }, 'All of them'));
     },
     () => undefined,
   );

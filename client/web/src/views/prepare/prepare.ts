@@ -25,6 +25,7 @@ import { CropControl } from './crop_control';
 import { estimateTexts, simplifiedInWords } from './estimate_texts';
 import { HistogramView } from './histogram_view';
 import { IsoField } from './iso_field';
+import { isoPresets } from './iso_presets';
 import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
@@ -34,6 +35,7 @@ import { looksInAddress, restoreLooks, sliceControls, watchLooks, WindowChoice }
 import { SliceLayers } from '../slices/slice_layers';
 import { ObliqueView } from '../slices/oblique_view';
 import { SliceMeasures } from '../slices/slice_measure';
+import { sliceProfile } from '../slices/slice_profile';
 import { SliceView, type SliceHost } from '../slices/slice_view';
 
 const mostBins = 1024;
@@ -117,7 +119,7 @@ class Prepare {
     this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box), (isGood) => this.mark('crop', isGood));
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
     this.isoPart = h('div.by-iso', this.isoRow(), this.histogram.element);
-    this.element = this.layout(common);
+    this.element = this.layout(common, host);
     this.kind.append(this.kindChoice() ?? '');
     this.showKind();
     scope.onEnd(() => {
@@ -133,7 +135,7 @@ class Prepare {
     const { volume, scope } = this;
     return {
       volume,
-      source: new SliceSource(volume, scope.signal),
+      source: new SliceSource(volume, scope),
       commonWindow,
       state: () => ({
         iso: isByLabels(this.parameters) ? null : this.iso,
@@ -146,7 +148,6 @@ class Prepare {
       setIso: (iso) => {
         if (!isByLabels(this.parameters)) this.setIso(iso);
       },
-      isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
       crop: isUpright(volume) ? { box: () => this.box, setBox: (box) => this.setBox(within(volume, box)) } : null,
       onError: (error) => this.sliceFailed(error),
@@ -207,7 +208,7 @@ class Prepare {
     this.isoPart.hidden = byLabels;
     this.labelPart.hidden = !byLabels;
     if (byLabels && !this.labelChoice) {
-      this.labelChoice = new LabelChoice(this.scope, this.volume, this.parameters, (choice) => this.setLabels(choice), () => this.update());
+      this.labelChoice = new LabelChoice(this.scope, this.volume, this.parameters, (choice) => this.setLabels(choice), () => this.update(), (place) => this.setCursor(place));
       this.labelPart.append(this.labelChoice.element);
     }
     this.faulty.clear();
@@ -269,7 +270,7 @@ class Prepare {
     return segmented('What to mesh', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
   }
 
-  private layout(common: Window): HTMLElement {
+  private layout(common: Window, { source }: SliceHost): HTMLElement {
     const { volume } = this;
     const area = paneArea(this.scope, [...this.slices, { element: this.live.element, name: 'the preview' }, this.oblique]);
     const element = h('div.prepare', { 'data-title': volumeName(volume) }, [
@@ -281,6 +282,7 @@ class Prepare {
         this.labelPart,
         this.windowRow(common),
         sliceControls(this.windowChoice, this.measures),
+        sliceProfile(volume, this.measures, source.exact, this.scope),
         this.layers.element,
         this.crop?.element ?? '',
         ...notedOf(volume),
@@ -313,15 +315,7 @@ class Prepare {
   }
 
   private isoRow(): HTMLElement {
-    const { suggested_iso: otsu, presets } = this.volume;
-    const span = spanOf(this.volume);
-    const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
-      button(`${name} ${formatValue(iso, span)}`, () => this.setIso(shortened(iso, span)), { class: 'chip' }),
-    );
-    return h('div.iso-row', [
-      this.isoField.element,
-      h('div.presets', { role: 'group', 'aria-label': 'Presets' }, ...chips),
-    ]);
+    return h('div.iso-row', this.isoField.element, isoPresets(this.volume, () => this.iso, (iso) => this.setIso(iso)));
   }
 
   private setIso(iso: number): void {

@@ -73,7 +73,7 @@ export class SliceLayers {
   private wereLabels = false;
   // Are for values.
   private readonly valueControls: HTMLElement[];
-  private readonly choice = h('select', h('option', { value: '' }, 'None'));
+  private readonly choice = h('select', h('option', { value: '' }, 'No overlay'));
   private next: string | null = null;
   private isListing = false;
   private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the overlay' });

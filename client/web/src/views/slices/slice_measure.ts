@@ -1,7 +1,9 @@
 // Lengths, angles and areas that a person draws in slices: those of three planes together.
 import type { Vec3, Volume } from '../../api/types';
+import { formatValue } from '../../ui/format';
 import { Signal } from '../../ui/signal';
 import { pictureAxes, axisIndex, toPatient, type Plane, type SlicePlane } from '../../volume/geometry';
+import { exactText, plainValue, profileOf, statisticsIn, type Samples } from '../../volume/exact';
 import { measureText, pointsOf, type MeasureKind } from '../../volume/measure';
 import { measuresOfText, measuresToText, type Measure, type Point } from './slice_texts';
 
@@ -14,6 +16,8 @@ export class SliceMeasures {
   // They are to be drawn anew.
   readonly changes = new Signal<number>(0);
   private measures: Measure[];
+  // Those that are whole.
+  private readonly values = new WeakMap<Measure, string>();
 
   // As an address says.
   constructor(text = '') {
@@ -23,6 +27,10 @@ export class SliceMeasures {
   // For the address.
   get text(): string {
     return measuresToText(this.measures);
+  }
+
+  get lastLength(): Measure | undefined {
+    return this.measures.filter(({ kind, isWhole }) => kind === 'length' && isWhole).at(-1);
   }
 
   // Takes a click; false if it is none of a measurement's.
@@ -63,14 +71,24 @@ export class SliceMeasures {
   }
 
   // Those of that slice and what they say, for who draws and for who hears them.
-  textsOf(volume: Volume, { plane, normal }: SlicePlane, index: number): { points: readonly Point[]; text: string; isClosed: boolean }[] {
+  textsOf(volume: Volume, { plane, normal }: SlicePlane, index: number, samples: () => Samples | null): { points: readonly Point[]; text: string; isClosed: boolean }[] {
     return this.measures
       .filter((one) => one.plane === plane && one.index === index)
-      .map(({ kind, points, isWhole }) => ({
-        points,
-        text: isWhole || kind === 'area' ? measureText(kind, points.map((point) => inPatient(volume, normal, index, point))) : '',
-        isClosed: kind === 'area' && isWhole,
-      }));
+      .map((measure) => {
+        const { kind, points, isWhole } = measure;
+        const size = isWhole || kind === 'area' ? measureText(kind, points.map((point) => inPatient(volume, normal, index, point))) : '';
+        const values = isWhole && kind !== 'angle' ? this.valuesIn(measure, samples()) : '';
+        return { points, text: [size, values].filter(Boolean).join(', '), isClosed: kind === 'area' && isWhole };
+      });
+  }
+
+  // They are drawn many times while they stay.
+  private valuesIn(measure: Measure, samples: Samples | null): string {
+    const known = this.values.get(measure);
+    if (known !== undefined || !samples) return known ?? '';
+    const text = valuesText(measure, samples);
+    this.values.set(measure, text);
+    return text;
   }
 
   // With the slice's samples as units, from the middle of the first one.
@@ -96,6 +114,19 @@ export class SliceMeasures {
   private changed(): void {
     this.changes.value += 1;
   }
+}
+
+// The samples at both ends of a length, and those in an area.
+function valuesText({ kind, points }: Measure, slice: Samples): string {
+  if (kind === 'length') {
+    const ends = points.map(([x, y]): Point => [Math.round(x), Math.round(y)]) as [Point, Point];
+    const values = profileOf(slice, ends);
+    return [values[0], values.at(-1)].map((value) => exactText(plainValue(value ?? NaN, slice))).join(' to ');
+  }
+  const found = statisticsIn(slice, points);
+  if (!found) return 'no sample inside';
+  const { mean, deviation, least, greatest } = found;
+  return `mean ${formatValue(mean)}, SD ${formatValue(deviation)}, ${exactText(least)} to ${exactText(greatest)}`;
 }
 
 function inPatient(volume: Volume, normal: SlicePlane['normal'], index: number, [column, row]: Point): Vec3 {

@@ -5,12 +5,13 @@ import { h } from '../../ui/dom';
 import { formatValue, shortened } from '../../ui/format';
 import { axisIndex, pictureAxes, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
-import { onlyInteger, valueIn, type Slice, type ValueRange, type Window } from '../../volume/slices';
+import { exactText, type ExactSamples } from '../../volume/exact';
+import { valueIn, type Slice, type ValueRange, type Window } from '../../volume/slices';
 import { placeText, sliceSpace } from './slice_looks';
 
 export interface ReadoutHost {
   volume: Volume;
-  isInteger: boolean;
+  exact: ExactSamples;
   // The slice that is shown, if it is there.
   slice: () => Slice | null;
   // Shown instead of that slice; null for none.
@@ -19,20 +20,14 @@ export interface ReadoutHost {
   labels: () => LabelLook | null;
 }
 
-interface Reading {
-  text: string;
-  value: number | null;
-}
-
 // Keeps the digits that the eight bits of a picture over that window tell.
-export function rounded({ low, high }: ValueRange, [from, to]: Window): Reading {
-  if (low === -Infinity) return { text: `at most ${formatValue(high, to - from)}`, value: null };
-  if (high === Infinity) return { text: `at least ${formatValue(low, to - from)}`, value: null };
+export function rounded({ low, high }: ValueRange, [from, to]: Window): string {
+  if (low === -Infinity) return `at most ${formatValue(high, to - from)}`;
+  if (high === Infinity) return `at least ${formatValue(low, to - from)}`;
   const span = high - low;
   const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, span)));
   const middle = Math.round((low + high) / 2 / digits) * digits;
-  const value = shortened(middle, span);
-  return { text: `about ${formatValue(value, span)}`, value };
+  return `about ${formatValue(shortened(middle, span), span)}`;
 }
 
 export class SliceReadout {
@@ -57,28 +52,20 @@ export class SliceReadout {
     this.element.replaceChildren(...[reading, h('span.slice-where', text.slice(value.length))].filter((part) => part !== false));
   }
 
-  // Says what is seen at that place.
+  // Says what is seen at that place. The mean of a slab is the value of no sample.
   private textAt(place: Vec3): string {
     const slice = this.host.slice();
-    const slab = slice && this.host.slabOf(slice);
-    if (!slab || place[axisIndex(slab.axis)] !== slab.index) return this.valueAt(place).text;
-    const [column, row] = pictureAxes(slab.axis);
-    return rounded(valueIn(slab, place[column], place[row]), slab.window).text;
-  }
-
-  // Reads the slice, also while a slab is shown: the mean of a slab is the value of no sample. Null where the picture tells no value.
-  valueAt(place: Vec3 | null): Reading {
-    const slice = this.host.slice();
-    if (!slice || place?.[axisIndex(slice.axis)] !== slice.index) return { text: '', value: null };
+    if (!slice || place[axisIndex(slice.axis)] !== slice.index) return '';
     const [column, row] = pictureAxes(slice.axis);
     const labels = this.host.labels();
     if (labels && slice.labels) {
       const label = labels.map.at(slice.labels[place[row] * slice.width + place[column]] ?? 0);
-      return { text: label ? labelTitle(label) : 'no label', value: null };
+      return label ? labelTitle(label) : 'no label';
     }
-    const range = valueIn(slice, place[column], place[row]);
-    const exact = this.host.isInteger ? onlyInteger(range) : null;
-    if (exact !== null) return { text: formatValue(exact), value: exact };
-    return rounded(range, slice.window);
+    const slab = this.host.slabOf(slice);
+    const exact = slab ? null : this.host.exact.valueAt(slice.axis, place);
+    if (exact !== null) return exactText(exact);
+    const seen = slab ?? slice;
+    return rounded(valueIn(seen, place[column], place[row]), seen.window);
   }
 }

@@ -10,7 +10,7 @@ import { labelImage, labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
 import { paintLetters, pixelsIn, sliceColours, sliceSpace } from './slice_looks';
 import type { ObliqueView } from './oblique_view';
-import type { SliceGrip, Spot } from './slice_grip';
+import { SliceGrip, type Spot } from './slice_grip';
 import type { SliceLayers } from './slice_layers';
 import type { SliceMeasures } from './slice_measure';
 import { SliceReadout } from './slice_readout';
@@ -45,7 +45,6 @@ export interface SliceHost {
   setWindow: (window: Window) => void;
   setCursor: (cursor: Vec3) => void;
   setIso: (iso: number) => void;
-  isInteger: boolean;
   contourColour: () => string;
   // Null where nothing can be cropped.
   crop: CropHost | null;
@@ -70,6 +69,8 @@ const titles: Record<Plane, string> = { axial: 'Axial', coronal: 'Coronal', sagi
 const padding = 14;
 // How much is seen of a slice that stands in for one that is not there yet.
 const otherSlice = 0.35;
+// How near a pointer must be to the place where the lines meet, in pixels.
+const crossReach = 7;
 const cropColour = '#f2b33d';
 
 export class SliceView {
@@ -105,10 +106,10 @@ export class SliceView {
     this.slider.disabled = this.count(this.layout.normal) === 1;
     this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
     this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
-    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop?.grip].filter((grip) => grip != null);
+    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop?.grip, this.crossGrip()].filter((grip) => grip != null);
     this.readout = new SliceReadout({
       volume: host.volume,
-      isInteger: host.isInteger,
+      exact: host.source.exact,
       slice: () => this.loader.slice,
       slabOf: ({ axis, index }) => host.layers?.projected(axis, index) ?? null,
       labels: () => host.state().labels,
@@ -128,7 +129,7 @@ export class SliceView {
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
-    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes, host.oblique?.changes]) {
+    for (const look of [host.source.exact.changes, labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes, host.oblique?.changes]) {
       if (look) scope.onEnd(look.subscribe(() => this.draw()));
     }
   }
@@ -170,6 +171,22 @@ export class SliceView {
     const edge = padding * (width / (clientWidth || 1));
     const whole = slicePlacement(this.host.volume, this.layout, { width, height, edge });
     return this.zoom.zoom.placed(whole, width, height);
+  }
+
+  // The place where the lines meet; not while points of a measurement are clicked.
+  private crossGrip(): SliceGrip<true> {
+    const [column, row] = pictureAxes(this.layout.normal);
+    const isNear = ({ place: [x, y], pixels: [wide, high], isTouch }: Spot): boolean => {
+      const { cursor } = this.host.state();
+      return !isTouch && !this.host.measures?.kind.value && Math.hypot((x - cursor[column]) * wide, (y - cursor[row]) * high) < crossReach;
+    };
+    return new SliceGrip((spot) => isNear(spot) || null, (_, place) => {
+      const cursor: Vec3 = [...this.host.state().cursor];
+      for (const [at, axis] of [column, row].entries()) {
+        cursor[axis] = Math.max(0, Math.min(this.host.volume.dims[axis] - 1, Math.round(place[at as 0])));
+      }
+      this.host.setCursor(cursor);
+    });
   }
 
   private draw(): void {
@@ -263,7 +280,9 @@ export class SliceView {
   }
 
   private measured(index: number): ReturnType<SliceMeasures['textsOf']> | undefined {
-    return this.host.measures?.textsOf(this.host.volume, this.layout, index);
+    const { measures, source, volume } = this.host;
+    const { normal } = this.layout;
+    return measures?.textsOf(volume, this.layout, index, () => (this.host.state().labels ? null : source.exact.find(normal, index)));
   }
 
   // Whether the click was one of a measurement.
@@ -344,8 +363,8 @@ export class SliceView {
   private listenToValues(): void {
     const { canvas, scope } = this;
     const take = (place: Vec3 | null): void => {
-      const { value } = this.readout.valueAt(place);
-      if (value !== null) this.host.setIso(value);
+      if (!place || this.host.state().labels) return;
+      this.host.source.exact.read(this.layout.normal, place).then(this.host.setIso, (error: unknown) => this.host.onError(error));
     };
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
       if (event.pointerType === 'mouse') this.readout.point(this.sampleAt(event), this.host.state().cursor);

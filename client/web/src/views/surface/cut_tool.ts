@@ -63,7 +63,7 @@ export class CutTool {
     ];
     this.axis = axial;
     this.index = this.middle;
-    this.source = new SliceSource(volume, scope.signal);
+    this.source = new SliceSource(volume, scope);
     this.free = new FreeCut(volume, scope.signal);
     // Labels are painted anew where others are seen, or the same ones otherwise.
     if (labels.labels.length > 0) {

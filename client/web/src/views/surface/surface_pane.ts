@@ -343,6 +343,20 @@ export class SurfacePane {
     this.press('cut', this.cut.isOn);
   }
 
+  // As it is looked at, and from three sides.
+  async pictures(): Promise<Blob[]> {
+    const { surface } = this;
+    if (!surface || !this.isWhole) return [];
+    const { place } = surface;
+    const blobs = [await surface.picture('#fff')];
+    for (const view of ['A', 'L', 'S'] as const) {
+      surface.look(view);
+      blobs.push(await surface.picture('#fff'));
+    }
+    surface.moveTo(place);
+    return blobs;
+  }
+
   private async savePicture(surface: Surface): Promise<void> {
     try {
       const blob = await surface.picture(cssColour('--viewport'));

@@ -1,7 +1,7 @@
 import type { RawDescription, SampleType } from '../../api/types';
 import { button, field, h, select } from '../../ui/dom';
 import { NumberField } from '../../ui/number_field';
-import { rawFault, sampleBytes } from '../../volume/raw';
+import { rawFault, sampleArrays } from '../../volume/raw';
 
 type Triple = [number, number, number];
 
@@ -40,7 +40,7 @@ const unknown: RawDescription = { dims: [0, 0, 0], type: 'int16', spacing: [1, 1
 export function rawForm(size: number, onDescribed: (raw: RawDescription) => void, described = unknown): HTMLElement {
   const dims = triple('Samples', described.dims);
   const spacing = triple('Spacing in mm', described.spacing);
-  const type = select(Object.keys(sampleBytes).map((name) => [name, name]), described.type);
+  const type = select(Object.keys(sampleArrays).map((name) => [name, name]), described.type);
   const chosenType = (): SampleType => type.value as SampleType;
   const order = select([['little', 'little-endian'], ['big', 'big-endian']], described.byteOrder);
   const fault = h('p.warning', { role: 'status' });

@@ -4,7 +4,7 @@ import type { Choice, Volume } from '../../api/types';
 import { button, h, uniqueId } from '../../ui/dom';
 import { hashOf } from '../../ui/route';
 import { numbersOf } from '../../ui/numbers';
-import { grouped, peekAtSeries, type Peek } from '../../volume/dicom_peek';
+import { dateOf } from '../../volume/names';
 import type { Gathered } from '../../volume/gather';
 import { paintPicture, timeChoice } from './time_choice';
 
@@ -56,25 +56,37 @@ export function unread(asked: Asked | null, stored: ReadonlyMap<string, Volume>)
 export type Source = Pick<Gathered, 'files' | 'stored'>;
 
 interface Row {
-  value: string;
-  thumbnail: HTMLCanvasElement;
-  facts: HTMLElement;
+  choice: Choice;
   element: HTMLElement;
 }
 
-// Patients, their studies and the series of these, as far as the page can read the files. A single study needs no heading.
-function tree(rows: readonly Row[], found: ReadonlyMap<string, Peek>): HTMLElement[] {
-  const rowOf = new Map(rows.map((row) => [row.value, row]));
-  const groups = grouped(rows.map(({ value }) => value), found);
-  const inside = (series: readonly string[]): HTMLElement[] => series.flatMap((uid) => rowOf.get(uid)?.element ?? []);
-  if (groups.length === 1) return inside(groups[0]?.series ?? []);
-  const patients = [...new Set(groups.map(({ patient }) => patient))];
-  return patients.map((patient) =>
+// As the server tells it of DICOM files.
+function studyOf({ series }: Choice): { patient: string; study: string; date: string } {
+  const date = dateOf(series?.study_date);
+  return {
+    patient: [series?.patient_name.replace(/\^+/g, ' ').trim(), series?.patient_id].filter(Boolean).join(', '),
+    study: [series?.study_description, date].filter(Boolean).join(', '),
+    date,
+  };
+}
+
+// Each with its own members, in the order in which they come first.
+function grouped<T>(all: readonly T[], key: (one: T) => string): [string, T[]][] {
+  const groups = new Map<string, T[]>();
+  for (const one of all) groups.set(key(one), [...(groups.get(key(one)) ?? []), one]);
+  return [...groups];
+}
+
+// Patients, their studies and the series of these. A single study needs no heading.
+function tree(rows: readonly Row[]): HTMLElement[] {
+  const studies = new Set(rows.map(({ choice }) => choice.series?.study_uid));
+  if (studies.size < 2) return rows.map(({ element }) => element);
+  return grouped(rows, ({ choice }) => studyOf(choice).patient).map(([patient, own]) =>
     h('li.choice-group', [
       h('b', patient || 'Other patients'),
-      ...groups
-        .filter((group) => group.patient === patient)
-        .map(({ studyTitle, series }) => h('div.choice-study', h('span.faint', studyTitle || 'Study'), h('ul', ...inside(series)))),
+      ...grouped(own, ({ choice }) => choice.series?.study_uid ?? '').map(([, [first, ...others]]) =>
+        h('div.choice-study', h('span.faint', (first && studyOf(first.choice).study) || 'Study'), h('ul', ...[first, ...others].map((row) => row?.element))),
+      ),
     ]),
   );
 }
@@ -94,34 +106,22 @@ function choiceList(
     readMarked.hidden = marked.size === 0;
     readMarked.textContent = `Read the ${marked.size} marked`;
   };
-  const rows = choices.map(({ value, title }) => {
-    const thumbnail = h('canvas', { width: 1, height: 1, 'aria-hidden': 'true', hidden: parameter !== 'series' });
-    const facts = h('span.faint');
-    const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), facts);
+  const rows = choices.map((choice): Row => {
+    const { value, title } = choice;
+    const picture = choice.series?.picture;
+    const thumbnail = picture && h('canvas', { 'aria-hidden': 'true' });
+    if (thumbnail) paintPicture({ ...picture, grey: Uint8ClampedArray.from(atob(picture.grey), (letter) => letter.charCodeAt(0)) }, thumbnail);
+    const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), h('span.faint', studyOf(choice).date));
     const seen = h('span.choice', thumbnail, text);
     const volume = stored.get(value);
     const isOneOfSeveral = parameter === 'series' && !volume && choices.length > 1;
     const box = isOneOfSeveral && h('input', { type: 'checkbox', 'aria-label': `Mark ${title}` });
     if (box) box.addEventListener('change', () => mark(value, box.checked));
     const element = volume ? h('li.stored', h('a', { href: hashOf(['volumes', volume.id]) }, seen), h('span.faint', 'stored')) : h('li', box, button(seen, () => onChoice(value)));
-    return { value, thumbnail, facts, element };
+    return { choice, element };
   });
   const own = parameter === 'spacing' && h('li', spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
-  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own, h('li', readMarked));
-  if (parameter === 'series') {
-    peekAtSeries(files.map(({ file }) => file), choices.map(({ value }) => value)).then(
-      (found) => {
-        for (const { value, thumbnail, facts } of rows) {
-          const peek = found.get(value);
-          facts.textContent = peek?.date ?? '';
-          if (peek?.picture) paintPicture(peek.picture, thumbnail);
-        }
-        list.replaceChildren(...tree(rows, found), h('li', readMarked));
-      },
-      // The browser cannot read the files any more. The titles are enough to choose.
-      () => undefined,
-    );
-  }
+  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...tree(rows), own, h('li', readMarked));
   const [only] = files;
   if (parameter !== 'volume' || !only || files.length > 1) return list;
   return h('div.stack', timeChoice(choices, only.file, onChoice), list);

@@ -2,8 +2,7 @@
 import type { Choice } from '../../api/types';
 import { button, h, uniqueId } from '../../ui/dom';
 import { greys, imageOf, paintImage } from '../../ui/pixels';
-import type { Picture } from '../../volume/dicom_peek';
-import { readTimePoints } from '../../volume/time_points';
+import { readTimePoints, type Picture } from '../../volume/time_points';
 
 // Draws it with its own pixels.
 export function paintPicture({ width, height, grey }: Picture, canvas: HTMLCanvasElement): void {

@@ -1,0 +1,75 @@
+// Which jobs are listed, and in which order: what the server sorts out, and what is searched for in the list.
+import { client } from '../../client';
+import type { Job, JobState } from '../../api/types';
+import type { JobSource } from '../../job/job_list';
+import { inWords, surfaceInWords } from '../../job/parameters';
+import { field, h, select } from '../../ui/dom';
+import { noteInAddress } from '../../ui/route';
+
+const states = ['queued', 'running', 'succeeded', 'failed', 'cancelled'] as const satisfies readonly JobState[];
+const orders = { '': 'Queue, then newest', oldest: 'Oldest', longest: 'Longest time', largest: 'Most triangles' } as const;
+type Order = keyof typeof orders;
+const names = ['state', 'since', 'until', 'volume', 'search', 'sort'] as const;
+const oneDay = 86_400_000;
+
+const by: Record<Exclude<Order, ''>, (a: Job, b: Job) => number> = {
+  oldest: (a, b) => (a.id < b.id ? -1 : 1),
+  longest: (a, b) => (b.timing.total ?? 0) - (a.timing.total ?? 0),
+  largest: (a, b) => (b.mesh?.triangles ?? 0) - (a.mesh?.triangles ?? 0),
+};
+
+export class JobFilter implements JobSource {
+  readonly element: HTMLElement;
+  readonly getJob = (id: string): Promise<Job> => client.getJob(id);
+  private readonly values: Partial<Record<(typeof names)[number], string>> = {};
+
+  // `onFilter`: the server lists others. `onOrder`: the same are shown otherwise.
+  constructor(query: URLSearchParams, onFilter: () => void, onOrder: () => void) {
+    for (const name of names) this.values[name] = query.get(name) ?? '';
+    const { values } = this;
+    const set = (name: (typeof names)[number], value: string, changed: () => void): void => {
+      values[name] = value;
+      noteInAddress({ [name]: value });
+      changed();
+    };
+    const date = (name: 'since' | 'until', label: string): HTMLElement =>
+      field(label, h('input', { type: 'date', value: values[name], onChange: ({ target }: Event) => set(name, (target as HTMLInputElement).value, onFilter) }));
+    const search = h('input', { type: 'search', value: values.search, placeholder: 'Volume, surface or job' });
+    search.addEventListener('input', () => set('search', search.value, onOrder));
+    const all = h('a.button', { href: '#/jobs', hidden: !values.volume }, 'Jobs of all volumes');
+    this.element = h('form.job-filter', { onSubmit: (event: Event) => event.preventDefault() }, [
+      field('Search', search),
+      field('State', select([['', 'All'], ...states.map((name) => [name, name] as const)], values.state, (state) => set('state', state, onFilter))),
+      date('since', 'From'),
+      date('until', 'To'),
+      field('Order', select(Object.entries(orders), values.sort, (order) => set('sort', order, onOrder))),
+      all,
+    ]);
+  }
+
+  get isOn(): boolean {
+    return Object.values(this.values).some(Boolean);
+  }
+
+  async listJobs(cursor = '', { state, limit }: { state?: JobState; limit?: number } = {}): ReturnType<JobSource['listJobs']> {
+    const { values } = this;
+    const own = (values.state || undefined) as JobState | undefined;
+    if (own && state && own !== state) return { jobs: [], next: null };
+    const last = Date.parse(values.until ?? '');
+    // The day itself, too.
+    const until = Number.isNaN(last) ? undefined : new Date(last + oneDay).toISOString().slice(0, 10);
+    return client.listJobs(cursor, { state: state ?? own, limit, volume: values.volume, since: values.since, until });
+  }
+
+  // Those that are searched for, in the order that is chosen.
+  shown(jobs: readonly Job[], nameOf: (job: Job) => string): Job[] {
+    const { state, search = '', sort } = this.values;
+    const words = search.toLowerCase().split(/\s+/).filter(Boolean);
+    const found = jobs.filter((job) => {
+      const text = [nameOf(job), surfaceInWords(job.parameters), inWords(job.parameters)].join(' ').toLowerCase();
+      return (!state || job.state === state) && words.every((word) => text.includes(word) || job.id.endsWith(word));
+    });
+    const compare = sort && sort in by ? by[sort as keyof typeof by] : null;
+    return compare ? found.sort(compare) : found;
+  }
+}
