@@ -208,6 +208,13 @@ int labels(Client& client, const Options& options) {
   return kDone;
 }
 
+int walls(Client& client, const Options& options) {
+  const Job job = client.job(job_id(client, options.id));
+  const std::vector<WallSummary> walls = client.job_walls(job.id);
+  std::cout << (options.json ? to_json(walls) + '\n' : wall_list(walls, unit_of(client, job)));
+  return kDone;
+}
+
 // Replaces an error that speaks of a field and of null, which this command does not have.
 Volume renamed(Client& client, const std::string& id, const std::optional<std::string>& name) {
   try {
@@ -262,6 +269,7 @@ constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
                                   CommandRow{Command::kList, list},
                                   CommandRow{Command::kInfo, info},
                                   CommandRow{Command::kLabels, labels},
+                                  CommandRow{Command::kWalls, walls},
                                   CommandRow{Command::kReport, report},
                                   CommandRow{Command::kIds, ids}};
 

@@ -28,6 +28,8 @@ import type {
   Volume,
   VolumeLabels,
   VolumeList,
+  WallList,
+  WallSummary,
 } from './types';
 import { upload } from './upload';
 
@@ -190,6 +192,17 @@ export class Client {
       cursor = page.next;
     }
     return labels;
+  }
+
+  /** Lists the areas where two labels of a finished job touch, or one is next to the background, whose `b` is null. */
+  async wallsOfJob(id: string, signal?: GlobalAbortSignal): Promise<WallSummary[]> {
+    const walls: WallSummary[] = [];
+    for (let cursor: string | null = ''; cursor !== null; ) {
+      const page: WallList = await this.connection.json(`${jobPath(id)}/walls${queryOf({ cursor })}`, { signal });
+      walls.push(...page.walls);
+      cursor = page.next;
+    }
+    return walls;
   }
 
   /** Erases a job that has ended, and its files. */
