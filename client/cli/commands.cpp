@@ -258,20 +258,14 @@ struct CommandRow {
   int (*run)(Client& client, const Options& options);
 };
 
-constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
-                                  CommandRow{Command::kSubmit, submit},
-                                  CommandRow{Command::kStatus, status},
-                                  CommandRow{Command::kWait, wait},
-                                  CommandRow{Command::kFetch, fetch},
-                                  CommandRow{Command::kCancel, cancel},
-                                  CommandRow{Command::kRename, rename},
-                                  CommandRow{Command::kErase, erase},
-                                  CommandRow{Command::kList, list},
-                                  CommandRow{Command::kInfo, info},
-                                  CommandRow{Command::kLabels, labels},
-                                  CommandRow{Command::kWalls, walls},
-                                  CommandRow{Command::kReport, report},
-                                  CommandRow{Command::kIds, ids}};
+constexpr std::array kCommands = {
+    CommandRow{Command::kEstimate, estimate}, CommandRow{Command::kSubmit, submit},
+    CommandRow{Command::kStatus, status},     CommandRow{Command::kWait, wait},
+    CommandRow{Command::kFetch, fetch},       CommandRow{Command::kCancel, cancel},
+    CommandRow{Command::kRename, rename},     CommandRow{Command::kErase, erase},
+    CommandRow{Command::kList, list},         CommandRow{Command::kInfo, info},
+    CommandRow{Command::kLabels, labels},     CommandRow{Command::kWalls, walls},
+    CommandRow{Command::kReport, report},     CommandRow{Command::kIds, ids}};
 
 int dispatch(const Options& options, const std::stop_token& stop) {
   if (options.command == Command::kMesh) return mesh(options, stop);
