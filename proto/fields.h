@@ -258,6 +258,14 @@ void visit(Is<LabelSummary> auto& self, auto&& field) {
   field("files", self.files);
 }
 
+void visit(Is<WallSummary> auto& self, auto&& field) {
+  field("a", self.a);
+  field("b", self.b);
+  field("area_mm2", self.area_mm2);
+  field("a_name", self.a_name);
+  field("b_name", self.b_name);
+}
+
 void visit(Is<LabelListFile> auto& self, auto&& field) {
   field("bytes", self.bytes);
   field("sha256", self.sha256);
@@ -293,8 +301,12 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   if (is_told(self, self.labels_count.has_value())) {
     field("labels_count", self.labels_count);
   }
+  if (is_told(self, self.walls_count.has_value())) {
+    field("walls_count", self.walls_count);
+  }
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(self)>>) {
     field("label_list", self.label_list);  // written by to_record() alone
+    field("wall_list", self.wall_list);
   }
   if (is_told(self, self.certificate.has_value())) {
     field("certificate", self.certificate);

@@ -76,6 +76,10 @@ std::string to_json(const std::vector<LabelSummary>& labels, const std::string& 
   return page("labels", labels, next);
 }
 
+std::string to_json(const std::vector<WallSummary>& walls, const std::string& next) {
+  return page("walls", walls, next);
+}
+
 std::string to_record(const Volume& volume) { return record_of(volume); }
 std::string to_record(const Job& job) { return record_of(job); }
 
@@ -102,6 +106,10 @@ std::vector<Volume> volumes_from_json(std::string_view text) {
 
 std::vector<LabelSummary> labels_from_json(std::string_view text) {
   return from_text<std::vector<LabelSummary>>(text, "labels");
+}
+
+std::vector<WallSummary> walls_from_json(std::string_view text) {
+  return from_text<std::vector<WallSummary>>(text, "walls");
 }
 
 std::vector<Job> jobs_from_json(std::string_view text) {

@@ -37,6 +37,8 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 
 // As a page of volumes, with "labels".
 std::string to_json(const std::vector<LabelSummary>& labels, const std::string& next);
+// As a page of volumes, with "walls".
+std::string to_json(const std::vector<WallSummary>& walls, const std::string& next = "");
 
 std::string volume_name_to_json(const std::optional<std::string>& name);
 
@@ -52,12 +54,13 @@ JobEvent job_event_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 std::vector<LabelSummary> labels_from_json(std::string_view text);
+std::vector<WallSummary> walls_from_json(std::string_view text);
 // The cursor of the page after one of volumes, jobs or orders; empty if that is the last.
 std::string next_from_json(std::string_view page);
 
 // A volume as stores and imports write it: to_json() with its labels.
 std::string to_record(const Volume& volume);
-// A job as a store keeps it: to_json() in full, with the file of its labels.
+// A job as a store keeps it: to_json() in full, with the files of its labels and walls.
 std::string to_record(const Job& job);
 
 // Reads the text of to_record(), or of to_json() for a timing, from this version or an older one.

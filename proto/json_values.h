@@ -144,6 +144,9 @@ inline void write_record(Json& place, const Job& job) {
   if (job.mesh && job.mesh->label_list) {
     write_field(member(place, "mesh"), "label_list", job.mesh->label_list);
   }
+  if (job.mesh && job.mesh->wall_list) {
+    write_field(member(place, "mesh"), "wall_list", job.mesh->wall_list);
+  }
 }
 
 // --- Reading -------------------------------------------------------------------------------------

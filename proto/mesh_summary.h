@@ -138,7 +138,19 @@ struct LabelSummary {
   bool operator==(const LabelSummary&) const = default;
 };
 
-// The file of a job's labels if they are too many for its record
+// The area where two labels of a finished job touch, or one is next to the background, after
+// smoothing.
+struct WallSummary {
+  std::int64_t a = 0;
+  std::optional<std::int64_t> b = {};  // greater than `a`; empty: the background
+  double area_mm2 = 0;
+  std::optional<std::string> a_name = {};
+  std::optional<std::string> b_name = {};
+
+  bool operator==(const WallSummary&) const = default;
+};
+
+// The file of a job's walls, or of its labels if they are too many for its record
 // (server/jobs/library/label_pages.h).
 struct LabelListFile {
   std::uint64_t bytes = 0;
@@ -297,6 +309,9 @@ struct MeshSummary {
   std::optional<std::uint64_t> labels_count = {};
   std::optional<LabelListFile> label_list = {};
   static constexpr std::size_t kMostListedLabels = 256;
+  // For a job by labels. Only records name the file of the walls; no walls have none.
+  std::optional<std::uint64_t> walls_count = {};
+  std::optional<LabelListFile> wall_list = {};
   std::optional<MeshCertificate> certificate = {};
 
   bool operator==(const MeshSummary&) const = default;

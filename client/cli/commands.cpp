@@ -208,6 +208,13 @@ int labels(Client& client, const Options& options) {
   return kDone;
 }
 
+int walls(Client& client, const Options& options) {
+  const Job job = client.job(job_id(client, options.id));
+  const std::vector<WallSummary> walls = client.job_walls(job.id);
+  std::cout << (options.json ? to_json(walls) + '\n' : wall_list(walls, unit_of(client, job)));
+  return kDone;
+}
+
 // Replaces an error that speaks of a field and of null, which this command does not have.
 Volume renamed(Client& client, const std::string& id, const std::optional<std::string>& name) {
   try {
@@ -251,19 +258,14 @@ struct CommandRow {
   int (*run)(Client& client, const Options& options);
 };
 
-constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
-                                  CommandRow{Command::kSubmit, submit},
-                                  CommandRow{Command::kStatus, status},
-                                  CommandRow{Command::kWait, wait},
-                                  CommandRow{Command::kFetch, fetch},
-                                  CommandRow{Command::kCancel, cancel},
-                                  CommandRow{Command::kRename, rename},
-                                  CommandRow{Command::kErase, erase},
-                                  CommandRow{Command::kList, list},
-                                  CommandRow{Command::kInfo, info},
-                                  CommandRow{Command::kLabels, labels},
-                                  CommandRow{Command::kReport, report},
-                                  CommandRow{Command::kIds, ids}};
+constexpr std::array kCommands = {
+    CommandRow{Command::kEstimate, estimate}, CommandRow{Command::kSubmit, submit},
+    CommandRow{Command::kStatus, status},     CommandRow{Command::kWait, wait},
+    CommandRow{Command::kFetch, fetch},       CommandRow{Command::kCancel, cancel},
+    CommandRow{Command::kRename, rename},     CommandRow{Command::kErase, erase},
+    CommandRow{Command::kList, list},         CommandRow{Command::kInfo, info},
+    CommandRow{Command::kLabels, labels},     CommandRow{Command::kWalls, walls},
+    CommandRow{Command::kReport, report},     CommandRow{Command::kIds, ids}};
 
 int dispatch(const Options& options, const std::stop_token& stop) {
   if (options.command == Command::kMesh) return mesh(options, stop);

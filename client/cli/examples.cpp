@@ -81,6 +81,9 @@ constexpr std::array kExamples = {
     Examples{"labels", R"(
   isomesh labels 3f2a91c0
 )"},
+    Examples{"walls", R"(
+  isomesh walls 0192e4b1-77c3
+)"},
     Examples{"completion", R"(
   isomesh completion bash >~/.local/share/bash-completion/completions/isomesh
   isomesh completion zsh >~/.zfunc/_isomesh

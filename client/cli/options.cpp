@@ -192,6 +192,8 @@ class Parser {
     add_number<std::int64_t>(labels, "--background",
                              "Value of samples without a label (default: 0)",
                              [&](std::int64_t value) { options_.background = value; });
+    add_id(command(Command::kWalls, "walls", "List the areas where the labels of a job touch"),
+           options_, "JOB");
     add_commands();
     add_descriptions();
   }

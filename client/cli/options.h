@@ -27,6 +27,7 @@ enum class Command {
   kList,
   kInfo,
   kLabels,
+  kWalls,
   kReport,
   kIds,
   kAdded,

@@ -51,8 +51,9 @@ class Units {
   explicit Units(const LengthUnit& unit) : unit_(unit.symbol) {}
 
   std::string length(double value, int digits) const { return fixed(value, digits) + ' ' + unit_; }
-  std::string area(double value) const { return fixed(value, 1) + ' ' + unit_ + "²"; }
+  std::string area(double value) const { return fixed(value, 1) + ' ' + square(); }
   std::string volume(double value) const { return fixed(value, 1) + ' ' + cubic(); }
+  std::string square() const { return unit_ + "²"; }
   std::string cubic() const { return unit_ + "³"; }
 
  private:
@@ -390,6 +391,17 @@ std::string label_list(const VolumeLabels& labels) {
                     label.color.value_or(""), label.name.value_or("")});
   }
   return in_columns({Align::kRight, Align::kRight, Align::kRight, Align::kLeft, Align::kLeft},
+                    rows);
+}
+
+std::string wall_list(const std::vector<WallSummary>& walls, const LengthUnit& unit) {
+  Rows rows = {{"label", "name", "label", "name", Units(unit).square()}};
+  for (const WallSummary& wall : walls) {
+    const std::string other = wall.b ? std::to_string(*wall.b) : "";
+    rows.push_back({std::to_string(wall.a), wall.a_name.value_or(""), other,
+                    wall.b ? wall.b_name.value_or("") : "background", fixed(wall.area_mm2, 1)});
+  }
+  return in_columns({Align::kRight, Align::kLeft, Align::kRight, Align::kLeft, Align::kRight},
                     rows);
 }
 

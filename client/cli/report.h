@@ -46,6 +46,7 @@ using VolumeNames = std::map<std::string, std::string>;
 std::string job_list(const std::vector<Job>& jobs, const VolumeNames& names = {});
 std::string volume_list(const std::vector<Volume>& volumes);
 std::string label_list(const VolumeLabels& labels);
+std::string wall_list(const std::vector<WallSummary>& walls, const LengthUnit& unit);
 
 // The input that a line of JSON is about, in its members `input`, as given on the command line, and
 // `member` if it has several volumes. Empty ones are left out.

@@ -358,6 +358,10 @@ std::vector<LabelSummary> Client::job_labels(const std::string& id) {
   return impl_->all_pages(job_path(id) + "/labels", labels_from_json);
 }
 
+std::vector<WallSummary> Client::job_walls(const std::string& id) {
+  return impl_->all_pages(job_path(id) + "/walls", walls_from_json);
+}
+
 std::string Client::report(const std::string& id) {
   std::string body = impl_->repeat({.target = job_path(id) + "/report"});
   if (!json_values::is_object(JsonTree(body).root())) throw other_api();

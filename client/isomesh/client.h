@@ -198,6 +198,10 @@ class Client {
   // kNotReady, the job's own error or kCancelled as fetch() does.
   std::vector<LabelSummary> job_labels(const std::string& id);
 
+  // The areas where two labels of a finished job touch, or one is next to the background, ascending
+  // by labels. Throws as job_labels() does.
+  std::vector<WallSummary> job_walls(const std::string& id);
+
   // The report on a finished job as JSON: parameters, volume, mesh, versions. Throws kNotReady, the
   // job's own error or kCancelled as fetch() does.
   std::string report(const std::string& id);

@@ -140,7 +140,9 @@ void give_mesh(Job& job, const MeshSummary& mesh) {
 std::vector<Blob> blobs_of(const MeshSummary& mesh) {
   std::vector<Blob> blobs;
   for (const auto& [format, file] : mesh.files) blobs.push_back({file.sha256, file.bytes});
-  if (mesh.label_list) blobs.push_back({mesh.label_list->sha256, mesh.label_list->bytes});
+  for (const auto& list : {mesh.label_list, mesh.wall_list}) {
+    if (list) blobs.push_back({list->sha256, list->bytes});
+  }
   return blobs;
 }
 

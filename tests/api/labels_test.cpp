@@ -358,6 +358,64 @@ TEST_F(LabelsTest, FewAreAPageToo) {
   EXPECT_TRUE(labels_from_json(none.body).empty());
 }
 
+TEST_F(LabelsTest, HaveTheAreasOfTheirWalls) {
+  const Job job = made(R"("labels": "all", "formats": ["stl"], "label_names": {"7": "Right"})");
+  const Answer answer = daemon_.get("/v1/jobs/" + job.id + "/walls");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const std::vector<WallSummary> walls = walls_from_json(answer.body);
+  ASSERT_EQ(job.mesh->walls_count, walls.size());
+  std::map<std::int64_t, double> areas;
+  double all = 0;
+  for (const WallSummary& wall : walls) {
+    areas[wall.a] += wall.area_mm2;
+    if (wall.b) areas[*wall.b] += wall.area_mm2;
+    all += wall.area_mm2;
+    EXPECT_EQ(wall.a_name.value_or(""), wall.a == 7 ? "Right" : "");
+    EXPECT_EQ(wall.b_name.value_or(""), wall.b == 7 ? "Right" : "");
+  }
+  EXPECT_FALSE(walls.front().b);  // the background comes first
+  for (const LabelSummary& label : job.mesh->labels) {
+    EXPECT_NEAR(areas[label.label], label.area_mm2, 1e-3);
+  }
+  EXPECT_NEAR(all, job.mesh->area_mm2, 1e-3);
+  EXPECT_EQ(daemon_.client().job_walls(job.id), walls);
+  const Finished shown = daemon_.command({"walls", job.id});
+  EXPECT_EQ(shown.status, 0) << shown.errors;
+  EXPECT_THAT(shown.output, HasSubstr("background"));
+  const Finished as_json = daemon_.command({"--json", "walls", job.id});
+  EXPECT_EQ(walls_from_json(as_json.output), walls);
+  const Answer none = daemon_.get("/v1/jobs/" + finished_job(daemon_).id + "/walls");
+  EXPECT_EQ(none.status, 200);
+  EXPECT_TRUE(walls_from_json(none.body).empty());
+}
+
+TEST_F(ManyLabelsTest, ListTheirWallsInPages) {
+  const std::string path = "/v1/jobs/" + job_.id + "/walls";
+  std::vector<WallSummary> walls;
+  std::string query;
+  do {
+    const Answer answer = daemon_.get(path + query);
+    ASSERT_EQ(answer.status, 200) << answer.body;
+    const auto page = walls_from_json(answer.body);
+    EXPECT_LE(page.size(), 256U);
+    walls.insert(walls.end(), page.begin(), page.end());
+    const json next = json::parse(answer.body)["next"];
+    query = next.is_null() ? "" : "?cursor=" + next.get<std::string>();
+  } while (!query.empty());
+  EXPECT_EQ(walls.size(), job_.mesh->walls_count);
+  EXPECT_GT(walls.size(), std::size_t{kLabels});
+  for (std::size_t n = 1; n < walls.size(); ++n) {
+    ASSERT_LT(std::pair(walls[n - 1].a, walls[n - 1].b), std::pair(walls[n].a, walls[n].b));
+  }
+  EXPECT_EQ(daemon_.client().job_walls(job_.id), walls);
+  const auto named = std::ranges::find(walls, 700, &WallSummary::a);
+  ASSERT_NE(named, walls.end());
+  EXPECT_EQ(named->a_name, "x");
+  for (const char* wrong : {"?cursor=", "?cursor=1", "?cursor=77616c6c733a2d31", "?x=1"}) {
+    EXPECT_EQ(daemon_.get(path + wrong).status, 400) << wrong;  // the last long one is "walls:-1"
+  }
+}
+
 TEST_F(LabelsTest, TheCommandWritesThem) {
   const TemporaryFolder folder;
   write_file(folder / "balls.raw", balls_.bytes);

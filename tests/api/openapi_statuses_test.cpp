@@ -197,7 +197,7 @@ void probe_erasing(Statuses& statuses, const Job& job) {
 }
 
 void probe_job_labels(Statuses& statuses, const Job& job, const Job& running) {
-  for (const std::string part : {"/labels", "/mesh.mtl", "/report"}) {
+  for (const std::string part : {"/labels", "/walls", "/mesh.mtl", "/report"}) {
     const std::string get = "GET /v1/jobs/{id}" + part;
     const std::string path = "/v1/jobs/" + job.id + part;
     statuses.probe(get, path);

@@ -185,6 +185,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   by_labels.parameters.lambda = 0.5;
   by_labels.parameters.label_values[3] = {3, 4};
   by_labels.mesh->labels = {{.label = 3, .voxels = 1}};
+  by_labels.mesh->walls_count = 1;
   const std::string digest(64, 'a');
   by_labels.mesh->labels[0].files[MeshFormat::kStl] = {.bytes = 1, .sha256 = digest, .href = "/x"};
   Job many_labels = by_labels;
@@ -227,6 +228,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"Job", to_json(by_labels)},
       {"Job", to_json(many_labels)},
       {"LabelSummaryList", to_json(by_labels.mesh->labels, "next")},
+      {"WallList", to_json(std::vector<WallSummary>{{.a = 3, .area_mm2 = 1, .a_name = "x"}}, "x")},
       {"JobParameters", to_json(by_labels.parameters)},
       {"JobList", to_json(std::vector{by_labels, many_labels})},
       {"Estimate", to_json(of_labels)},

@@ -85,6 +85,9 @@ TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
   const std::string list =
       run_sql("SELECT json_extract(record, '$.mesh.label_list.sha256') FROM jobs WHERE id = '" +
               job.id + "'");
+  const std::string walls =
+      run_sql("SELECT json_extract(record, '$.mesh.wall_list.sha256') FROM jobs WHERE id = '" +
+              job.id + "'");
   const std::string zip = job.mesh->files.at(MeshFormat::kZip).sha256;
   const std::string glb = job.mesh->files.at(MeshFormat::kGlb).sha256;
   const std::string path = "/v1/jobs/" + job.id;
@@ -92,6 +95,7 @@ TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
     return daemon().get(path + request).status;
   };
   for (const auto& [blob, request] : {std::pair(list, "/labels"),
+                                      {walls, "/walls"},
                                       {list, "/mesh.stl?label=7"},
                                       {zip, "/mesh.stl?label=7"},
                                       {zip, "/mesh.zip"},

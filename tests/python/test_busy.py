@@ -189,6 +189,7 @@ class Everything(DaemonTest):
             client.labels(mesh.job["volume"])
             client.estimate(volume, iso=-4)
             self.assertEqual(len(list(client.job_labels(mesh.job))), 1)
+            self.assertEqual(len(list(client.job_walls(mesh.job))), 1)
         self.assertGreater(len(server.refused), 15)
         self.assertEqual(len(clock.pauses), len(server.refused))
         self.assertTrue(all(7 <= pause <= 8.75 for pause in clock.pauses))

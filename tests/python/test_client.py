@@ -199,6 +199,9 @@ class Jobs(DaemonTest):
         self.assertEqual(job["mesh"]["labels_count"], 342)
         labels = list(self.client.job_labels(job))
         self.assertEqual([each["label"] for each in labels], list(range(1, 343)))
+        walls = list(self.client.job_walls(job))
+        self.assertEqual(len(walls), job["mesh"]["walls_count"])
+        self.assertEqual(sorted({each["a"] for each in walls}), list(range(1, 343)))
         size = self.client.download(job, self.folder / "300.stl", label=300).stat().st_size
         self.assertEqual(size, 84 + 50 * labels[299]["triangles"])
         with self.assertRaisesRegex(ValueError, "of the label 999"):
@@ -389,6 +392,7 @@ class Connections(DaemonTest):
             lambda client: client.upload(ball()), lambda client: client.mesh(ball(), iso=-8),
             lambda client: client.job("j"), lambda client: list(client.jobs()), lambda client: client.wait("j"),
             lambda client: list(client.job_labels("j")), lambda client: client.cancel("j"),
+            lambda client: list(client.job_walls("j")),
             lambda client: client.submit("v", iso=1), lambda client: client.estimate("v", iso=1),
             lambda client: client.fetch("j"),
         )

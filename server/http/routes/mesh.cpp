@@ -215,6 +215,24 @@ void list_labels(const App& app, const Request& request, Response& response) {
   answer_tagged_json(request, response, to_json(page, next));
 }
 
+// A page of a job's walls. Its cursor is the number of those before it.
+void list_walls(const App& app, const Request& request, Response& response) {
+  constexpr const char* kCursor = "walls";
+  check_known(request, {"cursor"});
+  const std::int64_t begin = label_after(request, kCursor).value_or(0);
+  if (begin < 0) throw wrong_cursor();
+  const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
+  check_has_mesh(job);
+  for (const auto& list : {job.mesh->label_list, job.mesh->wall_list}) {
+    if (list) check_intact(app, job, list->sha256);
+  }
+  const auto page = jobs::walls_of(job, static_cast<std::uint64_t>(begin), app.services.blobs);
+  const std::uint64_t end = static_cast<std::uint64_t>(begin) + page.size();
+  const bool has_more = !page.empty() && end < job.mesh->walls_count.value_or(0);
+  const std::string next = has_more ? cursor_after(kCursor, std::to_string(end)) : "";
+  answer_tagged_json(request, response, to_json(page, next));
+}
+
 // As JSON; null if it is gone.
 std::string volume_of(const App& app, const Request& request, const Job& job) {
   try {
@@ -308,6 +326,9 @@ void add_mesh_routes(App& app) {
   });
   add_computed_get(app, "/v1/jobs/{id}/labels", [&app](const auto& request, auto& response) {
     list_labels(app, request, response);
+  });
+  add_computed_get(app, "/v1/jobs/{id}/walls", [&app](const auto& request, auto& response) {
+    list_walls(app, request, response);
   });
   add_computed_get(app, "/v1/jobs/{id}/report",
                    [&app](const auto& request, auto& response) { report(app, request, response); });

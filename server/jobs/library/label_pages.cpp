@@ -1,6 +1,8 @@
 #include "server/jobs/library/label_pages.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -15,9 +17,10 @@ namespace {
 constexpr std::size_t kPerPage = MeshSummary::kMostListedLabels;
 constexpr std::size_t kNumberBytes = 8;
 constexpr std::size_t kEntryBytes = 2 * kNumberBytes;
+constexpr std::size_t kWallBytes = 3 * kNumberBytes;
 
 [[noreturn]] void throw_damaged() {
-  throw Error(ErrorCode::kInternal, "the stored list of a job's labels is damaged");
+  throw Error(ErrorCode::kInternal, "the stored list of a job's labels or walls is damaged");
 }
 
 void append(std::uint64_t number, std::vector<std::byte>& bytes) {
@@ -159,6 +162,71 @@ std::optional<LabelSummary> JobLabels::find(std::int64_t label) const {
     return is_there ? std::optional(*found) : std::nullopt;
   };
   return file_ ? found_in(page(page_of(label))) : found_in(job_.mesh->labels);
+}
+
+std::map<std::uint64_t, LabelSummary> JobLabels::at(const std::set<std::uint64_t>& places) const {
+  std::map<std::uint64_t, LabelSummary> labels;
+  std::vector<LabelSummary> here;
+  std::optional<std::size_t> read;
+  for (const std::uint64_t place : places) {
+    const std::size_t n = (place - 1) / kPerPage;
+    if (file_ && read != n) here = page(*(read = n));
+    labels.emplace(place, file_ ? here[(place - 1) % kPerPage] : job_.mesh->labels[place - 1]);
+  }
+  return labels;
+}
+
+void write_walls(std::span<const mesh::WallArea> walls, const codec::Sink& sink) {
+  std::vector<std::byte> bytes;
+  for (const mesh::WallArea& wall : walls) {
+    append(wall.a, bytes);
+    append(wall.b, bytes);
+    append(std::bit_cast<std::uint64_t>(wall.area_mm2), bytes);
+  }
+  sink(bytes);
+}
+
+std::vector<WallSummary> walls_of(const Job& job, std::uint64_t begin,
+                                  const store::BlobStore& blobs) {
+  if (!job.parameters.labels) return {};
+  if (!job.mesh->walls_count) {
+    throw Error(ErrorCode::kNotFound,
+                "the job was made before walls were measured; submit it again to have them");
+  }
+  const std::uint64_t count = *job.mesh->walls_count;
+  if (begin >= count) return {};
+  if (!job.mesh->wall_list) throw_damaged();
+  const auto file = blobs.open(job.mesh->wall_list->sha256);
+  if (file->size() / kWallBytes != count || file->size() % kWallBytes != 0) throw_damaged();
+  std::vector<std::byte> bytes(std::min<std::uint64_t>(kPerPage, count - begin) * kWallBytes);
+  read(*file, begin * kWallBytes, bytes);
+
+  const JobLabels labels(job, blobs);
+  std::vector<mesh::WallArea> walls;
+  std::set<std::uint64_t> places;
+  for (std::size_t at = 0; at < bytes.size(); at += kWallBytes) {
+    const auto number = [&](std::size_t n) {
+      return number_at(std::span(bytes).subspan(at + n * kNumberBytes, kNumberBytes));
+    };
+    const mesh::WallArea wall = {number(0), number(1), std::bit_cast<double>(number(2))};
+    const bool is_possible = wall.a > 0 && std::max(wall.a, wall.b) <= labels.count() &&
+                             wall.a != wall.b && std::isfinite(wall.area_mm2);
+    if (!is_possible) throw_damaged();
+    walls.push_back(wall);
+    places.insert(wall.a);
+    if (wall.b != 0) places.insert(wall.b);
+  }
+  const std::map<std::uint64_t, LabelSummary> found = labels.at(places);
+  std::vector<WallSummary> page;
+  for (const auto& [a, b, area] : walls) {
+    const LabelSummary& label = found.at(a);
+    WallSummary& wall = page.emplace_back();
+    wall = {.a = label.label, .area_mm2 = area, .a_name = label.name};
+    if (b == 0) continue;
+    wall.b = found.at(b).label;
+    wall.b_name = found.at(b).name;
+  }
+  return page;
 }
 
 std::string materials_of(const JobLabels& labels) {

@@ -3,19 +3,25 @@
 // MeshSummary::kMostListedLabels labels in ascending order, followed by an index. The index has one
 // entry per page: its first label and the offset of its first byte, each as a little-endian 64-bit
 // number.
+//
+// Its walls are in a file, too: for each one three such numbers, the places of its two labels among
+// the job's (from 1 on; 0 for the background) and the bits of its area.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "proto/types.h"
 #include "server/codec/encode.h"
+#include "server/mesh/labels/label_surface.h"
 #include "server/store/blob_store.h"
 
 namespace isomesh::jobs {
@@ -44,6 +50,9 @@ class JobLabels {
   // addresses.
   void for_each(const std::function<void(const LabelSummary& label)>& visit) const;
 
+  // The labels at those places in the list, from 1 to count(). Reads no page twice.
+  std::map<std::uint64_t, LabelSummary> at(const std::set<std::uint64_t>& places) const;
+
   // Empty if the job has no such label. Its files may have no addresses.
   std::optional<LabelSummary> find(std::int64_t label) const;
 
@@ -64,6 +73,14 @@ class JobLabels {
   std::vector<Page> pages_;
   std::uint64_t end_of_pages_ = 0;
 };
+
+// Writes the file of a job's walls.
+void write_walls(std::span<const mesh::WallArea> walls, const codec::Sink& sink);
+
+// The walls after the first `begin`, at most MeshSummary::kMostListedLabels. The job must have a
+// mesh. Throws Error kNotFound if it was made before walls were measured, and as JobLabels does.
+std::vector<WallSummary> walls_of(const Job& job, std::uint64_t begin,
+                                  const store::BlobStore& blobs);
 
 // The materials of the job's OBJ, in the form of its file kMaterialsName; empty for a job at an
 // iso-value. Throws as JobLabels does.

@@ -172,8 +172,10 @@ codec::Sink sink_of(Speaker& speaker, std::size_t file) {
   };
 }
 
-// Sends many labels as a file, since a job's record is read often.
-void send_many_labels(Speaker& speaker, std::size_t file, MeshSummary& summary) {
+// Sends walls and many labels as files, since a job's record is read often.
+void send_lists(Speaker& speaker, std::size_t file, const std::vector<mesh::WallArea>& walls,
+                MeshSummary& summary) {
+  if (!walls.empty()) write_walls(walls, sink_of(speaker, file + 1));
   if (summary.labels.size() <= MeshSummary::kMostListedLabels) return;
   write_label_pages(summary.labels, sink_of(speaker, file));
   summary.labels_count = summary.labels.size();
@@ -203,10 +205,13 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   MeshRequest request = request_of(order, volume);
   const SampleArray& samples = cropped.array();
   request.memory_bytes -= std::min(request.memory_bytes, cropped.rounded_bytes());
-  made.summary = order.parameters.labels
-                     ? make_labels(samples, request, sinks, progress, workspace.walls)
-                     : make_mesh(samples, request, sinks, progress, workspace.mesh);
-  send_many_labels(speaker, sinks.size(), made.summary);
+  if (order.parameters.labels) {
+    MadeLabels labels = make_labels(samples, request, sinks, progress, workspace.walls);
+    made.summary = std::move(labels.summary);
+    send_lists(speaker, sinks.size(), labels.walls, made.summary);
+  } else {
+    made.summary = make_mesh(samples, request, sinks, progress, workspace.mesh);
+  }
   progress.end_stage();
   made.timing = progress.timing();
   return made;

@@ -12,7 +12,6 @@
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
-#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/stairs/stairs.h"
 
@@ -158,11 +157,12 @@ CountedSurface count_labels(const SampleArray& samples, const MeshParameters& pa
   });
 }
 
-MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
-                        std::span<const codec::Sink> sinks, Progress& progress,
-                        mesh::SeparatingSurface& walls) {
+MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
+                       std::span<const codec::Sink> sinks, Progress& progress,
+                       mesh::SeparatingSurface& walls) {
   const MeshParameters& parameters = request.parameters;
-  MeshSummary summary;
+  MadeLabels made;
+  MeshSummary& summary = made.summary;
   progress.enter(Stage::kExtract);
   const auto labels =
       mesh::chosen_labels(count_values(samples, progress.context().part(0, 0.2)), parameters);
@@ -185,6 +185,8 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   const mesh::LabelTriangles triangles(walls);
   const auto measures = measure_labels(walls, triangles, progress.quiet());
   set_quality(measures, summary);
+  made.walls = measure_walls(walls, progress.quiet());
+  summary.walls_count = made.walls.size();
   for (std::size_t n = 0; n < labels.size(); ++n) {
     summary.labels.push_back(summary_of(labels[n], measures[n], parameters));
   }
@@ -195,7 +197,7 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
                provenance_of(samples, written), files.sinks(), progress, summary);
   }
   certify_stage(written, extracted, files, progress, walls.mesh, summary);
-  return summary;
+  return made;
 }
 
 }  // namespace isomesh::jobs

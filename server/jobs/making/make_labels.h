@@ -7,6 +7,7 @@
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
+#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/labels/label_voxels.h"
 #include "server/mesh/labels/separate.h"
 
@@ -22,12 +23,17 @@ std::vector<mesh::LabelVoxels> count_values(const SampleArray& samples,
 CountedSurface count_labels(const SampleArray& samples, const MeshParameters& parameters,
                             const mesh::Context& context);
 
+struct MadeLabels {
+  MeshSummary summary;
+  std::vector<mesh::WallArea> walls;  // as many as summary.walls_count
+};
+
 // As make_mesh, for parameters with labels. `sinks` has one sink for each of files_of(parameters),
 // in their order. The files of the labels have no paths. `walls` is working memory; afterwards it
 // holds the walls as they were encoded. Throws as make_mesh and count_values do, and Error
 // kUnusableVolume, which names them, if labels are missing or there are none.
-MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
-                        std::span<const codec::Sink> sinks, Progress& progress,
-                        mesh::SeparatingSurface& walls);
+MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
+                       std::span<const codec::Sink> sinks, Progress& progress,
+                       mesh::SeparatingSurface& walls);
 
 }  // namespace isomesh::jobs

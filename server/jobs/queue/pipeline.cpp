@@ -39,8 +39,8 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   std::vector<std::unique_ptr<store::BlobWriter>> writers;
   std::vector<codec::Sink> sinks;
   const std::vector<MeshFormat> files = files_of(parameters);
-  // One more than files: the last is for the list of labels, if it is long.
-  for (std::size_t i = 0; i <= files.size(); ++i) {
+  // Two more than files: for the list of labels, if it is long, and for that of walls.
+  for (std::size_t i = 0; i < files.size() + 2; ++i) {
     store::BlobWriter& writer = *writers.emplace_back(blobs.begin(owner));
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
   }
@@ -67,10 +67,12 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
     const store::Blob blob = writers[i]->commit(stop);
     result.mesh.files[files[i]] = {blob.bytes, blob.key, ""};
   }
-  if (result.mesh.labels_count) {
-    const store::Blob blob = writers.back()->commit(stop);
-    result.mesh.label_list = {blob.bytes, blob.key};
-  }
+  const auto list_in = [&](store::BlobWriter& writer) {
+    const store::Blob blob = writer.commit(stop);
+    return LabelListFile{blob.bytes, blob.key};
+  };
+  if (result.mesh.labels_count) result.mesh.label_list = list_in(*writers[files.size()]);
+  if (result.mesh.walls_count.value_or(0) > 0) result.mesh.wall_list = list_in(*writers.back());
   result.timing.encode += milliseconds_since(stored);
   report(Stage::kEncode, 1, result.timing);
   return result;

@@ -1,14 +1,18 @@
 #include "server/mesh/labels/label_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
 #include "server/mesh/measure/extent-inl.h"
 #include "server/mesh/measure/normals.h"
 #include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -199,6 +203,41 @@ std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
   parallel_for(context, measures.size(),
                [&](std::size_t n) { measures[n] = measure(surface, triangles, n + 1, quiet); });
   return measures;
+}
+
+std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Context& context) {
+  const Mesh& mesh = surface.mesh;
+  using Sides = std::pair<PartNumber, PartNumber>;
+  std::vector<std::map<Sides, double>> layers(mesh.layers());
+  parallel_for(context, layers.size(), [&](std::size_t layer) {
+    for (std::uint64_t t = mesh.layer_triangles[layer]; t < mesh.layer_triangles[layer + 1]; ++t) {
+      const auto at = [&](std::size_t i) { return to_point(mesh.positions[mesh.triangles[t][i]]); };
+      const Point normal = normal_of(at(0), at(1), at(2));
+      const WallSides& sides = surface.sides[t];
+      layers[layer][{sides.front, sides.back}] += std::sqrt(dot(normal, normal)) / 2;
+    }
+  });
+  std::map<std::pair<std::size_t, std::size_t>, double> areas;
+  for (const auto& layer : layers) {
+    for (const auto& [sides, area] : layer) {
+      std::array<std::vector<std::size_t>, 2> labels;  // on one side alone
+      surface.parts.visit_labels(sides.first, sides.second, [&](std::size_t label, bool is_front) {
+        labels[is_front ? 0 : 1].push_back(label);
+      });
+      for (auto& side : labels) {
+        if (side.empty()) side.push_back(0);
+      }
+      for (const std::size_t one : labels[0]) {
+        for (const std::size_t other : labels[1]) {
+          const auto [low, high] = std::minmax(one, other);
+          areas[low == 0 ? std::pair(high, low) : std::pair(low, high)] += area;
+        }
+      }
+    }
+  }
+  std::vector<WallArea> walls;
+  for (const auto& [pair, area] : areas) walls.push_back({pair.first, pair.second, area});
+  return walls;
 }
 
 double enclosed_by_all(const SeparatingSurface& surface, const Context& context) {

@@ -63,6 +63,19 @@ struct LabelMeasure {
 std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
                                          const LabelTriangles& triangles, const Context& context);
 
+// The area where two labels touch.
+struct WallArea {
+  std::size_t a = 0;  // the numbers of the labels, from 1 on; the smaller first
+  std::size_t b = 0;  // 0: the background, and what lies beyond caps
+  double area_mm2 = 0;
+};
+
+// The areas of all walls, ascending by `a`, then by `b`. A triangle belongs to each pair of a label
+// that is only on one side of it and a label that is only on the other side; where the other side
+// has no such label, to the background. If no labels overlap, that is one pair, and the areas add
+// up to the surface's. The same for any number of threads. Throws Error kCancelled.
+std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Context& context);
+
 // The volume that all labels enclose together, in cubic millimetres. For an open surface it is
 // defined as Extent::volume_mm3 is. The same for any number of threads. Throws Error kCancelled.
 double enclosed_by_all(const SeparatingSurface& surface, const Context& context);

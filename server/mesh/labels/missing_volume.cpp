@@ -7,6 +7,7 @@
 
 #include "server/mesh/extract/slab_passes.h"
 #include "server/mesh/labels/volume_tally.h"
+#include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
 
 namespace isomesh::mesh {
@@ -150,6 +151,29 @@ class TetrahedronDebt {
   const Places& places_;
 };
 
+Buffer<Point> indices_of(const LatticeToSpace& to_space, const Mesh& mesh, const Context& context) {
+  const Point origin = index_of(to_space, {0, 0, 0});
+  std::array<Point, 3> axes;
+  // The difference of two indices has few digits if the way between them is much shorter than a
+  // step.
+  const double mm = unit_mm(to_space);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Point unit = {0, 0, 0};
+    unit[axis] = mm;
+    axes[axis] = minus(index_of(to_space, unit), origin);
+    for (double& part : axes[axis]) part /= mm;
+  }
+  Buffer<Point> indices;
+  indices.resize_for_overwrite(mesh.positions.size());
+  for_each(context, indices.size(), [&](std::size_t v) {
+    Point& index = indices[v] = origin;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 3; ++i) index[i] += axes[axis][i] * mesh.positions[v][axis];
+    }
+  });
+  return indices;
+}
+
 }  // namespace
 
 std::array<TallyCases, 2> make_tally_cases(Scheme scheme, const std::array<WallCases, 2>& walls) {
@@ -181,16 +205,8 @@ Buffer<float> missing_volume(const Lattice<T>& lattice, const SeparateOptions& o
   separation.clusters = count.clusters;
   const std::array<TallyCases, 2> cases = make_tally_cases(options.scheme, separation.walls);
   std::vector<std::int64_t> units(fans.size(), 0);
-  VolumeTally tally = {surface, fans, cases, index_of(lattice.to_space, {0, 0, 0}), {}, units};
-  // The difference of two indices has few digits if the way between them is much shorter than a
-  // step.
-  const double mm = unit_mm(lattice.to_space);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    Point unit = {0, 0, 0};
-    unit[axis] = mm;
-    tally.axes[axis] = minus(index_of(lattice.to_space, unit), tally.origin);
-    for (double& part : tally.axes[axis]) part /= mm;
-  }
+  const Buffer<Point> indices = indices_of(lattice.to_space, surface.mesh, context);
+  VolumeTally tally = {surface, fans, cases, indices.span(), units};
   write_pass(separation, kSlotPlaces, context, surface.mesh, tally);
   for (std::size_t fan = 0; fan < units.size(); ++fan) {
     voxels[fan] = static_cast<float>(static_cast<double>(units[fan]) * VolumeTally::kUnit);

@@ -29,14 +29,28 @@ class TallyCellWriter {
  public:
   TallyCellWriter(const Separation& separation, const LabelRow& row, const EdgeOffsets& offsets,
                   std::uint32_t y, std::uint32_t z, VolumeTally& tally)
-      : separation_(separation), row_(row), offsets_(offsets), y_(y), z_(z), tally_(tally) {}
+      : separation_(separation),
+        row_(row),
+        offsets_(offsets),
+        y_(y),
+        z_(z),
+        hand_(separation.to_space.determinant() < 0 ? -1 : 1),
+        tally_(tally) {}
 
   Triangle* write(std::size_t x, unsigned /*bit*/, const LabelCells& /*cells*/,
                   const std::uint32_t* places, Triangle* out) const {
     const int borders = is_at_border(x, separation_.dims.x) + is_at_border(y_, separation_.dims.y) +
                         is_at_border(z_, separation_.dims.z);
     if (borders == 0) {
-      visit_triangles(x, places, [&](const Missing& missing) { give(missing); });
+      Sums sums;
+      visit_triangles(x, places, [&](const Missing& missing) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          sums.add(missing.vertices[k], missing.sides, in_units(missing.volumes[k]));
+        }
+      });
+      sums.visit([&](std::uint32_t vertex, WallSides sides, std::int64_t units) {
+        add(tally_.fans.find(vertex, {sides, false}), units);
+      });
       return out;
     }
     std::array<Missing, kMostTriangles> triangles;
@@ -114,20 +128,35 @@ class TallyCellWriter {
     }
   }
 
-  void give(const Missing& missing) const {
-    std::array<std::int64_t, 3> units;
-    for (std::size_t k = 0; k < 3; ++k) units[k] = in_units(missing.volumes[k]);
-    // Most triangles have two corners that were joined, which share one addition.
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::size_t next = k == 2 ? 0 : k + 1;
-      if (missing.vertices[k] == missing.vertices[next]) {
-        units[next] += std::exchange(units[k], 0);
+  // What a cell owes to each vertex of a wall. Most of its triangles share few of them, because
+  // vertices were joined.
+  class Sums {
+   public:
+    void add(std::uint32_t vertex, WallSides sides, std::int64_t units) {
+      const std::uint64_t key =
+          std::uint64_t{vertex} << 32 | std::uint64_t{sides.front} << 16 | sides.back;
+      std::size_t n = 0;
+      while (n < size_ && keys_[n] != key) ++n;
+      if (n == size_) {
+        keys_[size_] = key;
+        units_[size_++] = 0;
+      }
+      units_[n] += units;
+    }
+    template <class Visit>
+    void visit(Visit visit) const {
+      for (std::size_t n = 0; n < size_; ++n) {
+        const WallSides sides = {static_cast<PartNumber>(keys_[n] >> 16),
+                                 static_cast<PartNumber>(keys_[n])};
+        visit(static_cast<std::uint32_t>(keys_[n] >> 32), sides, units_[n]);
       }
     }
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (units[k] != 0) add(missing.fan(tally_, k), units[k]);
-    }
-  }
+
+   private:
+    std::array<std::uint64_t, 3 * kMostTriangles> keys_;
+    std::array<std::int64_t, 3 * kMostTriangles> units_;
+    std::size_t size_ = 0;
+  };
 
   void give(std::uint32_t fan, double volume) const { add(fan, in_units(volume)); }
 
@@ -142,7 +171,6 @@ class TallyCellWriter {
 
   Missing missing_at(const WallTriangle& triangle, WallSides sides, double owed, Double4 corner,
                      const TallyCases& cases, const std::uint32_t* places) const {
-    const Mesh& mesh = tally_.surface.mesh;
     Missing missing;
     std::array<Double4, 3> before = {};
     std::array<Double4, 3> moved = {};
@@ -153,24 +181,20 @@ class TallyCellWriter {
       const std::array<float, 3>& place = cases.places[name];
       missing.vertices[i] = vertex;
       before[i] = Double4{double{place[0]}, double{place[1]}, double{place[2]}, 0};
-      const Vec3& at = mesh.positions[vertex];
-      Double4 index = lanes(tally_.origin);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        index += lanes(tally_.axes[axis]) * double{at[axis]};
-      }
-      moved[i] = index - corner - before[i];
+      moved[i] = lanes(tally_.indices[vertex]) - corner - before[i];
     }
-    // Triangles are wound for space, which a left-handed lattice mirrors.
-    const double hand = separation_.to_space.determinant() < 0 ? -1 : 1;
-    const Double4 normal = swept_normal(before, moved) * hand;
+    const Double4 normal = swept_normal(before, moved) * hand_;
     const bool is_swapped = sides.front > sides.back;
     if (is_swapped) std::swap(sides.front, sides.back);
     missing.sides = sides;
+    Double4 volumes = {};
     for (std::size_t i = 0; i < 3; ++i) {
       const Double4 product = moved[i] * normal;
-      const double volume = owed - (product[0] + product[1] + product[2]) / 3;
-      missing.volumes[i] = is_swapped ? -volume : volume;
+      volumes[static_cast<int>(i)] = product[0] + product[1] + product[2];
     }
+    volumes = owed - volumes / 3.0;
+    if (is_swapped) volumes = -volumes;
+    for (std::size_t i = 0; i < 3; ++i) missing.volumes[i] = volumes[static_cast<int>(i)];
     return missing;
   }
 
@@ -194,6 +218,7 @@ class TallyCellWriter {
   const EdgeOffsets& offsets_;
   const std::uint32_t y_;
   const std::uint32_t z_;
+  const double hand_;  // triangles are wound for space, which a left-handed lattice mirrors
   VolumeTally& tally_;
 };
 

@@ -34,10 +34,8 @@ struct VolumeTally {
   SeparatingSurface& surface;
   const WallFans& fans;
   const std::array<TallyCases, 2>& cases;
-  // The map from space back to the lattice: index_of(p) = origin + the sum of p[k] * axes[k].
-  std::array<double, 3> origin;
-  std::array<std::array<double, 3>, 3> axes;
-  std::span<std::int64_t> units;  // by fan
+  std::span<const std::array<double, 3>> indices;  // of each vertex, in the lattice
+  std::span<std::int64_t> units;                   // by fan
 };
 
 void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,

@@ -1,7 +1,7 @@
 #include "server/mesh/labels/wall_fans.h"
 
 #include <algorithm>
-#include <numeric>
+#include <limits>
 #include <string>
 #include <tuple>
 
@@ -103,9 +103,9 @@ WallFans::WallFans(const SeparatingSurface& surface,
     fans_before[layer + 1] = fans_before[layer] + all[layer].walls.size();
     spokes_before[layer + 1] = spokes_before[layer] + all[layer].spokes.size();
   }
-  if (fans_before[layers] >= kNone) {
+  if (fans_before[layers] > std::numeric_limits<std::int32_t>::max()) {
     throw Error(ErrorCode::kTooLarge,
-                "the walls between the labels have too many vertices: 32 "
+                "the walls between the labels have too many vertices: 31 "
                 "bits cannot number what smoothing needs for each");
   }
   first_.resize_for_overwrite(mesh.positions.size() + 1);
@@ -143,44 +143,22 @@ std::uint32_t WallFans::find(std::size_t vertex, const Wall& wall) const {
 }
 
 void WallFans::find_neighbors(const Context& context) {
-  const auto visit = [&](std::size_t begin, std::size_t end, const auto& use) {
-    std::vector<std::uint32_t> vertices;
-    for (std::size_t fan = begin; fan < end; ++fan) {
-      vertices.clear();
-      for (const Spoke& spoke : spokes(fan)) vertices.push_back(spoke.next);
-      // A fan that is open has an end that is only a previous corner.
-      for (const Spoke& spoke : spokes(fan)) {
-        if (std::ranges::find(vertices, spoke.previous) == vertices.end()) {
-          vertices.push_back(spoke.previous);
-        }
-      }
-      use(fan, vertices);
+  neighbors_ = Rings(size(), context, [&](std::size_t fan, std::vector<std::uint32_t>& list) {
+    for (const Spoke& spoke : spokes(fan)) list.push_back(spoke.next);
+    // A fan that is open has an end that is only a previous corner.
+    for (const Spoke& spoke : spokes(fan)) {
+      if (std::ranges::find(list, spoke.previous) == list.end()) list.push_back(spoke.previous);
     }
-  };
-  std::vector<std::uint64_t> before(chunks_of(size()) + 1, 0);
-  for_chunks(context, size(), [&](std::size_t begin, std::size_t end) {
-    std::uint64_t& sum = before[begin / kChunk + 1];
-    visit(begin, end, [&](std::size_t, const auto& vertices) { sum += vertices.size(); });
-  });
-  std::partial_sum(before.begin(), before.end(), before.begin());
-  neighbors_begin_.resize_for_overwrite(size() + 1);
-  neighbors_.resize_for_overwrite(before.back());
-  neighbors_begin_[size()] = before.back();
-  for_chunks(context, size(), [&](std::size_t begin, std::size_t end) {
-    std::uint64_t next = before[begin / kChunk];
-    visit(begin, end, [&](std::size_t fan, const auto& vertices) {
-      neighbors_begin_[fan] = next;
-      for (const std::uint32_t v : vertices) neighbors_[next++] = find(v, walls_[fan]);
-    });
+    for (std::uint32_t& each : list) each = find(each, walls_[fan]);
   });
 }
 
 std::uint64_t WallFans::bytes(std::uint64_t vertices, std::uint64_t triangles) {
   // A vertex where three walls meet has three fans. A quarter of all vertices is a high estimate.
   const std::uint64_t fans = vertices + vertices / 2;
-  const std::uint64_t kept =
-      fans * (sizeof(std::uint32_t) + sizeof(Wall) + 2 * sizeof(std::uint64_t)) +
-      3 * triangles * (sizeof(Spoke) + sizeof(std::uint32_t)) + vertices * sizeof(std::uint32_t);
+  const std::uint64_t kept = fans * (sizeof(std::uint32_t) + sizeof(Wall) + sizeof(std::uint64_t)) +
+                             Rings::bytes(fans) + 3 * triangles * sizeof(Spoke) +
+                             vertices * sizeof(std::uint32_t);
   return kept + 3 * triangles * sizeof(Spoke) + fans * sizeof(Wall);  // while they are gathered
 }
 

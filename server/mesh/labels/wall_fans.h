@@ -9,6 +9,7 @@
 
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
+#include "server/mesh/labels/rings.h"
 #include "server/mesh/labels/separate.h"
 
 namespace isomesh::mesh {
@@ -36,7 +37,7 @@ class WallFans {
   WallFans() = default;
 
   // `is_cap` tells triangles of caps, which make walls of their own; it is called from several
-  // threads. `surface` need not outlive this. Throws Error kCancelled, and kTooLarge when 32 bits
+  // threads. `surface` need not outlive this. Throws Error kCancelled, and kTooLarge when 31 bits
   // cannot number all fans.
   WallFans(const SeparatingSurface& surface, const std::function<bool(const Triangle&)>& is_cap,
            const Context& context);
@@ -56,11 +57,8 @@ class WallFans {
     return spokes_.span().subspan(spokes_begin_[fan], spokes_begin_[fan + 1] - spokes_begin_[fan]);
   }
 
-  // The fans of the same wall at the vertices that its triangles join this one with.
-  std::span<const std::uint32_t> neighbors(std::size_t fan) const {
-    return neighbors_.span().subspan(neighbors_begin_[fan],
-                                     neighbors_begin_[fan + 1] - neighbors_begin_[fan]);
-  }
+  // By fan, those of the same wall at the vertices that its triangles join it with.
+  const Rings& neighbors() const { return neighbors_; }
 
   // An upper estimate of the memory for a surface of that size.
   static std::uint64_t bytes(std::uint64_t vertices, std::uint64_t triangles);
@@ -73,8 +71,7 @@ class WallFans {
   Buffer<Wall> walls_;
   Buffer<std::uint64_t> spokes_begin_;
   Buffer<Spoke> spokes_;
-  Buffer<std::uint64_t> neighbors_begin_;
-  Buffer<std::uint32_t> neighbors_;
+  Rings neighbors_;
 };
 
 }  // namespace isomesh::mesh

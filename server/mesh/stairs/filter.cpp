@@ -1,7 +1,9 @@
 #include "server/mesh/stairs/filter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace isomesh::mesh {
 namespace {
@@ -37,9 +39,15 @@ std::vector<float> flat_series(int degree, double time) {
 
 void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>& shares,
             std::span<const float> series, const Context& context, WallShape& shape) {
-  const std::vector<Lanes> first = shape.at;
-  std::vector<Lanes> before = first;  // T[j - 2], then T[j]
-  std::vector<Lanes> now = first;     // T[j - 1]
+  Buffer<Lanes> first;
+  Buffer<Lanes> before;  // T[j - 2], then T[j]
+  Buffer<Lanes> now;     // T[j - 1]
+  for (Buffer<Lanes>* const each : {&first, &before, &now}) {
+    each->resize_for_overwrite(shape.vertices());
+    for_chunks(context, shape.vertices(), [&](std::size_t begin, std::size_t end) {
+      std::copy(shape.at.begin() + begin, shape.at.begin() + end, each->begin() + begin);
+    });
+  }
   for (std::size_t j = 1; j < series.size(); ++j) {
     for_each(context, vertices.size(), [&](std::size_t i) {
       const std::size_t v = vertices[i];
@@ -48,7 +56,7 @@ void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>
       before[v] = j == 1 ? moved : 2.0F * moved - before[v];
       shape.at[v] += series[j] * (before[v] - first[v]);  // the sum of all is 1
     });
-    before.swap(now);
+    std::swap(before, now);
   }
 }
 

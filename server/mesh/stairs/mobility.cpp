@@ -23,6 +23,7 @@ struct Bends {
 constexpr float kBendsPerSample = 10;
 constexpr int kBendSteps = 6;       // from edge to edge
 constexpr float kBendLoss = 0.12F;  // with each
+constexpr float kNoBend = 2;        // more than any bend
 // The walls' smoothing gives way to the curve's within four edges of it.
 constexpr int kCurveSteps = 4;
 constexpr float kCurveLoss = 0.2F;
@@ -39,7 +40,7 @@ float clamped(float value) { return std::clamp(value, 0.0F, 1.0F); }
 class Finder {
  public:
   Finder(const WallShape& shape, const Context& context)
-      : shape_(shape), context_(context), near_curve_(shape.vertices(), 0) {
+      : shape_(shape), context_(context), near_curve_(filled(0.0F)) {
     for (auto* values : {&found_.moves, &found_.owes}) values->assign(shape.vertices(), 0);
     for (auto* values : {&found_.spread, &found_.calm}) values->assign(shape.vertices(), 1);
   }
@@ -53,6 +54,20 @@ class Finder {
   }
 
  private:
+  // By vertex; behind the last is a zero.
+  template <class Value>
+  Buffer<Value> filled(Value value) const {
+    Buffer<Value> values;
+    values.resize_for_overwrite(shape_.vertices());
+    std::ranges::fill(values, value);
+    return values;
+  }
+  static Buffer<float> copy_of(const Buffer<float>& values) {
+    Buffer<float> copy;
+    std::ranges::copy(values, copy.resize_for_overwrite(values.size()));
+    return copy;
+  }
+
   template <class Body>
   void for_vertices(const Body& body) const {
     for_each(context_, shape_.vertices(), body);
@@ -65,31 +80,29 @@ class Finder {
   }
 
   void find_staircases() {
-    std::vector<Bends> bends(shape_.vertices());
+    Buffer<Bends> bends = filled(Bends{});
+    Buffer<Bends> next = filled(Bends{});
     for_vertices([&](std::size_t v) {
-      if (shape_.degree(v) > 0) bends[v] = bends_at(v);
+      if (shape_.neighbors().degree(v) > 0) bends[v] = bends_at(v);
     });
-    std::vector<Bends> next = bends;
     for (int step = 0; step < kBendSteps; ++step) {
       for_vertices([&](std::size_t v) {
         Bends most = bends[v];
-        shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
-          if (shape_.is_curve(neighbor) != shape_.is_curve(v)) return;
-          most.out = std::max(most.out, bends[neighbor].out - kBendLoss);
-          most.in = std::max(most.in, bends[neighbor].in - kBendLoss);
+        const bool is_curve = shape_.is_curve(v);
+        shape_.neighbors().visit(v, [&](std::uint32_t neighbor) {
+          const float loss = shape_.is_curve(neighbor) != is_curve ? kNoBend : kBendLoss;
+          most.out = std::max(most.out, bends[neighbor].out - loss);
+          most.in = std::max(most.in, bends[neighbor].in - loss);
         });
         next[v] = most;
       });
-      bends.swap(next);
+      std::swap(bends, next);
     }
     const auto both = [&](std::size_t v) { return std::min(bends[v].out, bends[v].in); };
     for_vertices([&](std::size_t v) {
       float sum = 0;
-      float count = 0;
-      shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
-        sum += both(neighbor);
-        ++count;
-      });
+      shape_.neighbors().visit(v, [&](std::uint32_t neighbor) { sum += both(neighbor); });
+      const auto count = static_cast<float>(shape_.neighbors().degree(v));
       if (count == 0) return;
       found_.moves[v] = std::min(1.0F, both(v) + sum / count);
       found_.owes[v] = std::max(found_.owes[v], found_.moves[v]);
@@ -115,7 +128,7 @@ class Finder {
       };
       add(way_to_mean(v), 0);
       // A curve bends a wall beside it one way only, even where it goes around an edge.
-      shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+      shape_.neighbors().visit(v, [&](std::uint32_t neighbor) {
         if (shape_.is_curve(neighbor)) add(way_to_mean(neighbor), kBendLoss);
       });
     }
@@ -144,19 +157,18 @@ class Finder {
       found_.curves.push_back(static_cast<std::uint32_t>(v));
       near_curve_[v] = 1;
     }
-    std::vector<float> next = near_curve_;
+    Buffer<float> next = copy_of(near_curve_);
     for (int step = 0; step <= kCurveSteps; ++step) {
       const float loss = step == 0 ? 0 : kCurveLoss;
       for_vertices([&](std::size_t v) {
         float most = near_curve_[v];
         if (shape_.is_curve(v)) return;
-        shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+        shape_.neighbors().visit(v, [&](std::uint32_t neighbor) {
           most = std::max(most, near_curve_[neighbor] - loss);
         });
         next[v] = most;
       });
-      near_curve_.swap(next);
-      next = near_curve_;
+      std::swap(near_curve_, next);
     }
     for (std::size_t v = 0; v < shape_.vertices(); ++v) {
       const bool is_beside = near_curve_[v] > 0 && !shape_.is_curve(v);
@@ -165,25 +177,26 @@ class Finder {
   }
 
   void find_noise() {
-    std::vector<float> junctions(shape_.vertices(), 0);
-    for_curves([&](std::size_t v) { junctions[v] = shape_.degree(v) > 2 ? 1.0F : 0.0F; });
-    std::vector<float> next = junctions;
+    Buffer<float> junctions = filled(0.0F);
+    for_curves(
+        [&](std::size_t v) { junctions[v] = shape_.neighbors().degree(v) > 2 ? 1.0F : 0.0F; });
+    Buffer<float> next = copy_of(junctions);
     for (int step = 0; step < kCalmSteps; ++step) {
       for_curves(
           [&](std::size_t v) { next[v] = 0.5F * junctions[v] + 0.5F * shape_.mean(v, junctions); });
-      junctions.swap(next);
+      std::swap(junctions, next);
     }
     for_curves(
         [&](std::size_t v) { found_.calm[v] = 1 - clamped((junctions[v] - kNoisy) / kNoisy); });
     // Noise on a curve also counts as noise in the triangles beside it.
     for (int step = 0; step < 2; ++step) {
-      next = found_.calm;
+      std::vector<float> least = found_.calm;
       for_vertices([&](std::size_t v) {
         shape_.visit_spokes(v, [&](std::size_t, const Spoke& spoke) {
-          next[v] = std::min({next[v], found_.calm[spoke.next], found_.calm[spoke.previous]});
+          least[v] = std::min({least[v], found_.calm[spoke.next], found_.calm[spoke.previous]});
         });
       });
-      found_.calm.swap(next);
+      found_.calm.swap(least);
     }
   }
 
@@ -193,9 +206,9 @@ class Finder {
     std::size_t previous = start;
     std::size_t at = start;
     do {
-      if (shape_.degree(at) != 2 || ++length == kLongCurve) return kLongCurve;
+      if (shape_.neighbors().degree(at) != 2 || ++length == kLongCurve) return kLongCurve;
       std::size_t next = at;
-      shape_.visit_neighbors(at, [&](std::uint32_t neighbor) {
+      shape_.neighbors().visit(at, [&](std::uint32_t neighbor) {
         if (next == at && (neighbor != previous || at == start)) next = neighbor;
       });
       previous = std::exchange(at, next);
@@ -215,7 +228,7 @@ class Finder {
       const float calm = found_.calm[v];
       found_.owes[v] *= kOwedInNoise + (1 - kOwedInNoise) * calm;
       if (shape_.is_curve(v)) {
-        found_.moves[v] = shape_.degree(v) > 1 ? calm * share_of_curve(v) : 0;
+        found_.moves[v] = shape_.neighbors().degree(v) > 1 ? calm * share_of_curve(v) : 0;
       } else if (shape_.is_held(v)) {
         found_.moves[v] = near_curve_[v] * calm;
       } else {
@@ -230,7 +243,7 @@ class Finder {
 
   const WallShape& shape_;
   const Context& context_;
-  std::vector<float> near_curve_;
+  Buffer<float> near_curve_;
   Mobility found_;
 };
 

@@ -12,32 +12,29 @@ struct Suspect {
   Lanes wall_normal = {};
 };
 
-// Normals of a wall around its vertices.
-class WallNormals {
- public:
-  WallNormals(const WallShape& shape, const Context& context)
-      : shape_(shape), normals_(shape.fans().size()) {
-    for_each(context, normals_.size(), [&](std::size_t fan) {
-      for (const Spoke& spoke : shape.fans().spokes(fan)) {
-        normals_[fan] += shape.normal(shape.fans().vertex(fan), spoke);
-      }
-    });
-  }
-
-  // Summed over everything within so many edges, as often as there are ways there.
-  Lanes around(std::uint32_t fan, int edges) const {
-    if (edges == 0) return normals_[fan];
-    Lanes sum = around(fan, edges - 1);
-    for (const std::uint32_t neighbor : shape_.fans().neighbors(fan)) {
-      sum += around(neighbor, edges - 1);
-    }
-    return sum;
-  }
-
- private:
-  const WallShape& shape_;
-  std::vector<Lanes> normals_;
+// By fan, the normals of a wall around its vertices.
+struct WallNormals {
+  Buffer<Lanes> own;
+  Buffer<Lanes> near;  // its own and its neighbours'
 };
+
+WallNormals normals_of(const WallShape& shape, const Context& context) {
+  const WallFans& fans = shape.fans();
+  WallNormals normals;
+  normals.own.resize_for_overwrite(fans.size());
+  normals.near.resize_for_overwrite(fans.size());
+  for_each(context, fans.size(), [&](std::size_t fan) {
+    Lanes sum = {};
+    for (const Spoke& spoke : fans.spokes(fan)) sum += shape.normal(fans.vertex(fan), spoke);
+    normals.own[fan] = sum;
+  });
+  for_each(context, fans.size(), [&](std::size_t fan) {
+    Lanes sum = normals.own[fan];
+    fans.neighbors().visit(fan, [&](std::uint32_t each) { sum += normals.own[each]; });
+    normals.near[fan] = sum;
+  });
+  return normals;
+}
 
 Lanes normal_of(const WallShape& shape, const std::array<std::uint32_t, 3>& corners) {
   return cross(shape.at[corners[1]] - shape.at[corners[0]],
@@ -50,8 +47,7 @@ bool is_less(Lanes a, Lanes b, float cosine) { return dot(a, b) < cosine * lengt
 // The triangles that may be folded: those that lie away from their corners' own normals.
 std::vector<Suspect> find_suspects(const WallShape& shape, const Context& context) {
   constexpr float kSuspect = 0.7F;
-  constexpr int kEdges = 2;
-  const WallNormals normals(shape, context);
+  const WallNormals normals = normals_of(shape, context);
   const WallFans& fans = shape.fans();
   std::vector<std::vector<Suspect>> found(chunks_of(shape.vertices()));
   for_each(context, shape.vertices(), [&](std::size_t v) {
@@ -63,10 +59,13 @@ std::vector<Suspect> find_suspects(const WallShape& shape, const Context& contex
       const std::array own = {static_cast<std::uint32_t>(fan), fans.find(spoke.next, wall),
                               fans.find(spoke.previous, wall)};
       Lanes near = {};
-      for (const std::uint32_t each : own) near += normals.around(each, 0);
+      for (const std::uint32_t each : own) near += normals.own[each];
       if (!is_less(normal_of(shape, corners), near, kSuspect)) return;
       Lanes wide = {};
-      for (const std::uint32_t each : own) wide += normals.around(each, kEdges);
+      for (const std::uint32_t each : own) {  // of all within two edges
+        wide += normals.near[each];
+        fans.neighbors().visit(each, [&](std::uint32_t next) { wide += normals.near[next]; });
+      }
       found[v / kChunk].push_back({corners, wide});
     });
   });
@@ -87,7 +86,8 @@ void unfold(const Context& context, WallShape& shape) {
     for (const Suspect& suspect : suspects) {
       if (!is_less(normal_of(shape, suspect.corners), suspect.wall_normal, kFolded)) continue;
       for (const std::uint32_t v : suspect.corners) {
-        if (is_hit[v] != 0 || shape.degree(v) <= (shape.is_curve(v) ? 1U : 0U)) continue;
+        if (is_hit[v] != 0 || shape.neighbors().degree(v) <= (shape.is_curve(v) ? 1U : 0U))
+          continue;
         is_hit[v] = 1;
         hit.push_back(v);
       }

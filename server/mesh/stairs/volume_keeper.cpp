@@ -2,44 +2,57 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
 
 namespace isomesh::mesh {
 namespace {
 
-// A vertex's part of the volume that one of its triangles has swept since the start, in the
-// direction of its normal. The parts of the three corners add up to all of it.
-float swept(const WallShape& shape, std::size_t v, const Spoke& spoke) {
-  const std::vector<Lanes>& start = shape.start();
-  const Lanes e1 = start[spoke.next] - start[v];
-  const Lanes e2 = start[spoke.previous] - start[v];
-  const Lanes way = shape.at[v] - start[v];
-  const Lanes f1 = shape.at[spoke.next] - start[spoke.next] - way;
-  const Lanes f2 = shape.at[spoke.previous] - start[spoke.previous] - way;
-  // Twice the area vector, in the mean over the way.
-  const Lanes area = cross(e1, e2 + 0.5F * f2) + cross(f1, 0.5F * e2 + (1 / 3.0F) * f2);
-  return dot(way, area) / 6;
-}
+// Sums over the triangles of a fan.
+struct FanSums {
+  Lanes normal = {};  // its length is twice the area
+  Lanes between = {};
+  float area = 0;  // of all, six times
+
+  // `between`: of the triangles half-way between those at the start and now, four times.
+  FanSums(const WallShape& shape, std::size_t v, std::span<const Spoke> spokes) {
+    const Buffer<Lanes>& start = shape.start();
+    const Lanes at = shape.at[v];
+    const Lanes twice = start[v] + at;
+    for (const Spoke& spoke : spokes) {
+      const Lanes next = shape.at[spoke.next];
+      const Lanes previous = shape.at[spoke.previous];
+      const Lanes here = cross(next - at, previous - at);
+      normal += here;
+      area += length(here);
+      between += cross(start[spoke.next] + next - twice, start[spoke.previous] + previous - twice);
+    }
+  }
+};
 
 }  // namespace
 
 VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility,
                            const std::vector<float>& missing, const std::vector<float>& series,
                            const Context& context)
-    : shape_(shape),
-      mobility_(mobility),
-      missing_(missing),
-      series_(series),
-      context_(context),
-      kept_(shape.fans().size()),
-      shares_(shape.fans().size()),
-      areas_(shape.fans().size()) {
+    : shape_(shape), mobility_(mobility), missing_(missing), series_(series), context_(context) {
   const WallFans& fans = shape.fans();
+  for (Buffer<float>* const each : {&kept_, &shares_, &areas_}) {
+    each->resize_for_overwrite(fans.size());
+  }
+  normals_.resize_for_overwrite(fans.size());
   for_each(context, fans.size(), [&](std::size_t fan) {
     const std::size_t v = fans.vertex(fan);
+    Lanes normal = {};
     float area = 0;
-    for (const Spoke& spoke : fans.spokes(fan)) area += length(shape.normal(v, spoke)) / 6;
-    areas_[fan] = area;
-    const auto count = static_cast<float>(fans.neighbors(fan).size());
+    for (const Spoke& spoke : fans.spokes(fan)) {
+      const Lanes here = shape.normal(v, spoke);
+      normal += here;
+      area += length(here);
+    }
+    normals_[fan] = normal;
+    areas_[fan] = area / 6;
+    const auto count = static_cast<float>(fans.neighbors().degree(fan));
     kept_[fan] = 1 - mobility.spread[v];
     shares_[fan] = mobility.spread[v] / std::max(1.0F, count);
   });
@@ -56,7 +69,7 @@ bool VolumeKeeper::may_move(std::size_t vertex) const {
 }
 
 void VolumeKeeper::find_areas() {
-  std::vector<float> room(areas_.size());
+  Buffer<float> room = all_fans();
   for_each(context_, areas_.size(), [&](std::size_t fan) {
     const std::size_t v = shape_.fans().vertex(fan);
     room[fan] = may_move(v) ? areas_[fan] * mobility_.owes[v] : 0;
@@ -64,54 +77,56 @@ void VolumeKeeper::find_areas() {
   room_ = diffused(std::move(room), Way::kSpread);
 }
 
-std::vector<float> VolumeKeeper::diffused(std::vector<float> values, Way way) const {
-  const WallFans& fans = shape_.fans();
-  std::vector<float> before(values.size());  // T[j - 2], then T[j]; values is T[j - 1]
-  std::vector<float> sum(values.size());
-  std::vector<float> given(way == Way::kSpread ? values.size() : 0);
-  for (std::size_t i = 0; i < values.size(); ++i) sum[i] = series_[0] * values[i];
+Buffer<float> VolumeKeeper::all_fans() const {
+  Buffer<float> values;
+  values.resize_for_overwrite(areas_.size());
+  return values;
+}
+
+Buffer<float> VolumeKeeper::diffused(Buffer<float> values, Way way) const {
+  const Rings& neighbors = shape_.fans().neighbors();
+  Buffer<float> before = all_fans();  // T[j - 2], then T[j]; values is T[j - 1]
+  Buffer<float> sum = all_fans();
+  Buffer<float> given;
+  if (way == Way::kSpread) given = all_fans();
   for (std::size_t j = 1; j < series_.size(); ++j) {
-    const float twice = j == 1 ? 1 : 2;
     if (way == Way::kSpread) {
       for_each(context_, values.size(),
                [&](std::size_t fan) { given[fan] = values[fan] * shares_[fan]; });
     }
-    const std::vector<float>& from = way == Way::kSpread ? given : values;
+    const Buffer<float>& from = way == Way::kSpread ? given : values;
     for_each(context_, values.size(), [&](std::size_t fan) {
-      float mean = 0;
-      for (const std::uint32_t neighbor : fans.neighbors(fan)) mean += from[neighbor];
+      float mean = neighbors.sum(fan, from);
       if (way == Way::kAverage) mean *= shares_[fan];
-      before[fan] = twice * (mean + kept_[fan] * values[fan]) - before[fan];
-      sum[fan] += series_[j] * before[fan];
+      const float step = mean + kept_[fan] * values[fan];
+      before[fan] = j == 1 ? step : 2 * step - before[fan];
+      sum[fan] = (j == 1 ? series_[0] * values[fan] : sum[fan]) + series_[j] * before[fan];
     });
-    before.swap(values);
+    std::swap(before, values);
   }
   return sum;
 }
 
 // Along the normals, which are found too.
-std::vector<float> VolumeKeeper::offsets(const WallShape& shape,
-                                         std::vector<Lanes>& normals) const {
+Buffer<float> VolumeKeeper::offsets(const WallShape& shape, Buffer<Lanes>& normals) const {
   constexpr float kLeastRoom = 0.02F;  // of the area
   constexpr float kLeastFacing = 0.3F;
   // Up to this share of it the area is taken for that at the start. Labels of a few voxels grow
   // more, and by that area they would shrink by too much in turn.
   constexpr float kAlike = 0.6F;
   const WallFans& fans = shape.fans();
-  std::vector<float> offsets(fans.size());
-  std::vector<float> areas(fans.size());
+  Buffer<float> offsets = all_fans();
+  Buffer<float> areas = all_fans();
   for_each(context_, fans.size(), [&](std::size_t fan) {
     const std::size_t v = fans.vertex(fan);
-    float missing = missing_[fan];
-    float area = 0;
-    Lanes normal = {};
-    for (const Spoke& spoke : fans.spokes(fan)) {
-      missing -= swept(shape, v, spoke);
-      const Lanes sixth = shape.normal(v, spoke) / 6.0F;
-      normal += sixth;
-      area += length(sixth);
-    }
-    normals[fan] = normal;
+    const FanSums sums(shape, v, fans.spokes(fan));
+    // A vertex has a part of the volume that each of its triangles has swept since the start in the
+    // direction of its normal: its way times a third of the area vector, in the mean over the way.
+    // The parts of the three corners add up to all of it.
+    const Lanes way = shape.at[v] - shape.start()[v];
+    const float missing = missing_[fan] - dot(way, normals_[fan] + sums.normal + sums.between) / 36;
+    normals[fan] = sums.normal / 6.0F;
+    const float area = sums.area / 6;
     areas[fan] = holds_curves_ && shape.is_curve(v) ? 0 : area;
     const float grown = areas_[fan] > 0 ? std::max(1.0F, kAlike * area / areas_[fan]) : 1;
     const float room = std::max(grown * room_[fan], kLeastRoom * areas[fan]);
@@ -135,8 +150,7 @@ std::vector<float> VolumeKeeper::offsets(const WallShape& shape,
 
 // The way whose part along each wall's normal is that wall's offset, as near as may be.
 Lanes VolumeKeeper::way_of_curve(const WallShape& shape, std::size_t vertex,
-                                 const std::vector<float>& offsets,
-                                 const std::vector<Lanes>& normals) const {
+                                 const Buffer<float>& offsets, const Buffer<Lanes>& normals) const {
   constexpr float kDamping = 0.1F;  // where walls lie nearly in one plane
   std::array<Lanes, 3> rows = {Lanes{kDamping, 0, 0, 0}, Lanes{0, kDamping, 0, 0},
                                Lanes{0, 0, kDamping, 0}};
@@ -155,8 +169,9 @@ Lanes VolumeKeeper::way_of_curve(const WallShape& shape, std::size_t vertex,
 }
 
 void VolumeKeeper::restore(WallShape& shape) const {
-  std::vector<Lanes> normals(shape.fans().size());
-  const std::vector<float> along = offsets(shape, normals);
+  Buffer<Lanes> normals;
+  normals.resize_for_overwrite(shape.fans().size());
+  const Buffer<float> along = offsets(shape, normals);
   for_each(context_, shape.vertices(), [&](std::size_t v) {
     if (!may_move(v)) return;
     if (shape.is_curve(v)) {

@@ -27,12 +27,13 @@ class VolumeKeeper {
  private:
   enum class Way { kSpread, kAverage };
 
+  Buffer<float> all_fans() const;  // of indeterminate values
   void find_areas();
   bool may_move(std::size_t vertex) const;
-  std::vector<float> diffused(std::vector<float> values, Way way) const;
-  std::vector<float> offsets(const WallShape& shape, std::vector<Lanes>& normals) const;
-  Lanes way_of_curve(const WallShape& shape, std::size_t vertex, const std::vector<float>& offsets,
-                     const std::vector<Lanes>& normals) const;
+  Buffer<float> diffused(Buffer<float> values, Way way) const;
+  Buffer<float> offsets(const WallShape& shape, Buffer<Lanes>& normals) const;
+  Lanes way_of_curve(const WallShape& shape, std::size_t vertex, const Buffer<float>& offsets,
+                     const Buffer<Lanes>& normals) const;
 
   const WallShape& shape_;
   const Mobility& mobility_;
@@ -40,10 +41,11 @@ class VolumeKeeper {
   const std::vector<float>& series_;
   const Context& context_;
   bool holds_curves_ = false;
-  std::vector<float> kept_;    // by fan: of itself in the mean
-  std::vector<float> shares_;  // by fan: of a neighbour in the mean
-  std::vector<float> areas_;   // by fan, at the start
-  std::vector<float> room_;    // those that may take volume, spread
+  Buffer<float> kept_;     // by fan: of itself in the mean
+  Buffer<float> shares_;   // by fan: of a neighbour in the mean
+  Buffer<float> areas_;    // by fan, at the start
+  Buffer<Lanes> normals_;  // the same; the length is twice the area
+  Buffer<float> room_;     // those that may take volume, spread
 };
 
 }  // namespace isomesh::mesh

@@ -13,7 +13,7 @@ WallShape::WallShape(const SeparatingSurface& surface, const Dims& dims,
   place(surface, dims, to_space, context);
   fans_ = WallFans(
       surface, [&](const Triangle& triangle) { return is_cap(triangle); }, context);
-  find_curves(context);
+  find_neighbors(context);
 }
 
 void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
@@ -30,8 +30,9 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
 
   const Mesh& mesh = surface.mesh;
   const std::array<std::uint32_t, 3> samples = {dims.x, dims.y, dims.z};
-  start_.resize(mesh.positions.size());
-  flags_.resize(mesh.positions.size());
+  start_.resize_for_overwrite(mesh.positions.size());
+  flags_.resize_for_overwrite(mesh.positions.size());
+  at.resize_for_overwrite(mesh.positions.size());
   // Caps lie half a step beyond the outermost samples, the ends of an open wall in them.
   const double beyond = closed_ ? 0.5 : 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -53,10 +54,9 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
           std::abs(index[axis] + beyond) < kNear || std::abs(index[axis] - last) < kNear;
       if (is_in_face) axes |= static_cast<std::uint8_t>(1U << axis);
     }
-    start_[v] *= spacing_;
+    at[v] = start_[v] *= spacing_;
     flags_[v] = !closed_ || mesh.is_on_border(v) ? axes : 0;
   });
-  at = start_;
 }
 
 bool WallShape::is_cap(const Triangle& triangle) const {
@@ -65,7 +65,7 @@ bool WallShape::is_cap(const Triangle& triangle) const {
 }
 
 // Those with which other than two triangles join a vertex, of walls or of caps.
-std::vector<std::uint32_t> WallShape::neighbors_along_curves(std::size_t v) const {
+void WallShape::list_along_curves(std::size_t v, std::vector<std::uint32_t>& found) const {
   std::vector<std::pair<std::uint32_t, bool>> ends;  // of triangles, and whether those are caps
   visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
     const bool is_cap = fans_.wall(fan).is_cap;
@@ -73,36 +73,29 @@ std::vector<std::uint32_t> WallShape::neighbors_along_curves(std::size_t v) cons
     ends.emplace_back(spoke.previous, is_cap);
   });
   std::ranges::sort(ends);
-  std::vector<std::uint32_t> found;
   for (auto begin = ends.begin(), end = begin; begin != ends.end(); begin = end) {
     end = std::find_if(begin, ends.end(), [&](const auto& other) { return other != *begin; });
     const std::uint32_t neighbor = begin->first;
     if (end - begin != 2 && (found.empty() || found.back() != neighbor)) found.push_back(neighbor);
   }
-  return found;
 }
 
-void WallShape::find_curves(const Context& context) {
+void WallShape::find_neighbors(const Context& context) {
   // A fan that is open has one neighbour more than triangles.
   const auto may_be_on_curve = [&](std::size_t v) {
     const std::size_t first = fans_.begin(v);
     const std::size_t count = fans_.begin(v + 1) - first;
-    return count > 1 || (count == 1 && fans_.neighbors(first).size() != fans_.spokes(first).size());
+    return count > 1 ||
+           (count == 1 && fans_.neighbors().degree(first) != fans_.spokes(first).size());
   };
-  curve_begin_.assign(vertices() + 1, 0);
-  const auto visit = [&](const auto& use) {
-    for_each(context, vertices(), [&](std::size_t v) {
-      if (may_be_on_curve(v)) use(v, neighbors_along_curves(v));
-    });
-  };
-  visit([&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
-    curve_begin_[v + 1] = static_cast<std::uint32_t>(neighbors.size());
-    if (!neighbors.empty()) flags_[v] |= kCurve;
-  });
-  for (std::size_t v = 0; v < vertices(); ++v) curve_begin_[v + 1] += curve_begin_[v];
-  curve_neighbors_.resize(curve_begin_.back());
-  visit([&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
-    std::ranges::copy(neighbors, curve_neighbors_.begin() + curve_begin_[v]);
+  neighbors_ = Rings(vertices(), context, [&](std::size_t v, std::vector<std::uint32_t>& list) {
+    if (may_be_on_curve(v)) list_along_curves(v, list);
+    if (!list.empty()) {
+      flags_[v] |= kCurve;
+      return;
+    }
+    // Each neighbour of another is the next corner of one triangle.
+    visit_spokes(v, [&](std::size_t /*fan*/, const Spoke& spoke) { list.push_back(spoke.next); });
   });
 }
 

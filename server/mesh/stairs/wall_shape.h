@@ -44,8 +44,8 @@ class WallShape {
   const WallFans& fans() const { return fans_; }
 
   // The positions of the vertices at the start, and now.
-  const std::vector<Lanes>& start() const { return start_; }
-  std::vector<Lanes> at;
+  const Buffer<Lanes>& start() const { return start_; }
+  Buffer<Lanes> at;
 
   // Signed: negative along x in a left-handed lattice, which is mirrored.
   Lanes spacing() const { return spacing_; }
@@ -69,17 +69,7 @@ class WallShape {
   }
 
   // The neighbours of a vertex on a curve are those along it.
-  template <class Visit>
-  void visit_neighbors(std::size_t v, Visit visit) const {
-    if (is_curve(v)) {
-      for (std::size_t i = curve_begin_[v]; i < curve_begin_[v + 1]; ++i) {
-        visit(curve_neighbors_[i]);
-      }
-      return;
-    }
-    // Each neighbour of another is the next corner of one triangle.
-    visit_spokes(v, [&](std::size_t /*fan*/, const Spoke& spoke) { visit(spoke.next); });
-  }
+  const Rings& neighbors() const { return neighbors_; }
 
   // Calls visit(fan, spoke) for all triangles at a vertex.
   template <class Visit>
@@ -89,22 +79,10 @@ class WallShape {
     }
   }
 
-  std::size_t degree(std::size_t v) const {
-    std::size_t count = 0;
-    visit_neighbors(v, [&](std::uint32_t) { ++count; });
-    return count;
-  }
-
   // The mean over the neighbours; there must be at least one.
   template <class Value>
-  Value mean(std::size_t v, const std::vector<Value>& values) const {
-    Value sum = {};
-    float count = 0;
-    visit_neighbors(v, [&](std::uint32_t neighbor) {
-      sum += values[neighbor];
-      ++count;
-    });
-    return sum / count;
+  Value mean(std::size_t v, const Buffer<Value>& values) const {
+    return neighbors_.sum(v, values) / static_cast<float>(neighbors_.degree(v));
   }
 
   // The normal of a triangle; its length is twice the area.
@@ -118,9 +96,9 @@ class WallShape {
 
   void place(const SeparatingSurface& surface, const Dims& dims, const LatticeToSpace& to_space,
              const Context& context);
-  void find_curves(const Context& context);
+  void find_neighbors(const Context& context);
   bool is_cap(const Triangle& triangle) const;
-  std::vector<std::uint32_t> neighbors_along_curves(std::size_t v) const;
+  void list_along_curves(std::size_t v, std::vector<std::uint32_t>& found) const;
 
   const bool closed_;
   Lanes spacing_ = {};
@@ -128,11 +106,10 @@ class WallShape {
   float smallest_spacing_ = 0;
   Lanes low_ = {};
   Lanes high_ = {};
-  std::vector<Lanes> start_;
-  std::vector<std::uint8_t> flags_;
+  Buffer<Lanes> start_;
+  Buffer<std::uint8_t> flags_;
   WallFans fans_;
-  std::vector<std::uint32_t> curve_begin_;  // of each vertex, and all
-  std::vector<std::uint32_t> curve_neighbors_;
+  Rings neighbors_;
 };
 
 }  // namespace isomesh::mesh

@@ -201,6 +201,15 @@ TEST(LabelList, IsATable) {
             "      7       1  2,000.0  #ff8000  liver\n");
 }
 
+TEST(WallList, IsATable) {
+  EXPECT_EQ(wall_list({{.a = 3, .area_mm2 = 1234.56, .a_name = "liver"},
+                       {.a = 3, .b = 12, .area_mm2 = 7, .a_name = "liver", .b_name = "gut"}},
+                      {"mm", "millimetres", 1e-3}),
+            "  label  name   label  name            mm²\n"
+            "      3  liver         background  1,234.6\n"
+            "      3  liver     12  gut             7.0\n");
+}
+
 TEST(JobReport, TellsAJobThatRunsFromOneThatFailed) {
   Job job = test::finished_job("7", "mesh");
   job.state = JobState::kRunning;

@@ -145,5 +145,47 @@ TEST_F(LabelPagesTest, OfADamagedFileAreRejected) {
   EXPECT_EQ(code_thrown_by([&] { all_of(missing); }), ErrorCode::kNotFound);
 }
 
+TEST_F(LabelPagesTest, WallsTellTheirLabels) {
+  Job job = job_with(file_of(some_labels(600)), 600);
+  job.parameters.labels.emplace();
+  job.mesh->walls_count = 300;
+  std::vector<mesh::WallArea> walls(300);
+  for (std::size_t n = 0; n < walls.size(); ++n) {
+    walls[n] = {n + 1, n % 2 == 0 ? 0U : 600U, static_cast<double>(n) / 4};
+  }
+  const auto keep = [&](std::string file) {
+    const store::Blob blob = test::put(blobs_, file);
+    job.mesh->wall_list = {blob.bytes, blob.key};
+  };
+  std::string file;
+  write_walls(walls, [&](std::span<const std::byte> bytes) {
+    file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  keep(file);
+  EXPECT_EQ(walls_of(job, 0, blobs_).size(), 256U);
+  EXPECT_EQ(walls_of(job, 256, blobs_).size(), 44U);
+  EXPECT_TRUE(walls_of(job, 300, blobs_).empty());
+  const auto both = walls_of(job, 298, blobs_);
+  const WallSummary alone = {-300 + 3 * 298, std::nullopt, 74.5, "label 298", std::nullopt};
+  const WallSummary last = {-300 + 3 * 299, -300 + 3 * 599, 74.75, "label 299", "label 599"};
+  EXPECT_EQ(both, (std::vector{alone, last}));
+
+  const auto code = [&] { return code_thrown_by([&] { walls_of(job, 0, blobs_); }); };
+  keep(file.substr(1));
+  EXPECT_EQ(code(), ErrorCode::kInternal);
+  for (const auto& [at, byte] : {std::pair(0, 0), {1, 0x7f}, {33, 0x7f}, {22, 0xff}}) {
+    std::string damaged = file;  // no label, labels that there are not, an area that is none
+    damaged[static_cast<std::size_t>(at)] = static_cast<char>(byte);
+    if (at == 22) damaged[23] = '\x7f';
+    keep(damaged);
+    EXPECT_EQ(code(), ErrorCode::kInternal) << at;
+  }
+  job.mesh->walls_count.reset();
+  job.mesh->wall_list.reset();
+  EXPECT_EQ(code(), ErrorCode::kNotFound);
+  job.parameters.labels.reset();
+  EXPECT_FALSE(code());
+}
+
 }  // namespace
 }  // namespace isomesh::jobs

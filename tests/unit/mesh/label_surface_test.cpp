@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
@@ -10,6 +12,7 @@
 
 #include "server/mesh/measure/normals.h"
 #include "server/mesh/smooth/smooth.h"
+#include "server/mesh/stairs/stairs.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/nifti.h"
@@ -41,6 +44,103 @@ TEST(LabelSurface, IsSoundAndClosedWhateverTheLabelsAre) {
       }
     }
   }
+}
+
+using WallAreas = std::map<std::pair<std::size_t, std::size_t>, double>;
+
+WallAreas walls_between(const SeparatingSurface& surface) {
+  WallAreas areas;
+  for (const WallArea& wall : measure_walls(surface, {})) areas[{wall.a, wall.b}] = wall.area_mm2;
+  return areas;
+}
+
+TEST(LabelWalls, OfTwoBoxesAreTheFacesThatTheyShare) {
+  auto volume = test::constant<std::uint8_t>(0, {16, 14, 10});
+  volume.geometry.spacing = {0.5, 1, 2};
+  for (std::uint32_t z = 0; z < 10; ++z) {
+    for (std::uint32_t y = 2; y < 12; ++y) {
+      for (std::uint32_t x = 2; x < 14; ++x) volume.at(x, y, z) = x < 8 ? 3 : 5;
+    }
+  }
+  const SeparatingSurface surface = separated(volume, {.labels = {3, 5}, .close = true});
+  WallAreas areas = walls_between(surface);
+  ASSERT_EQ(areas.size(), 3U);
+  // Edges are bevelled, within half a sample of them.
+  const double shared = areas[std::pair(1, 2)];
+  EXPECT_LE(shared, 10.0 * 20);
+  EXPECT_GE(shared, 9.0 * 18);
+  // Five faces of each box.
+  const double other = areas[std::pair(1, 0)];
+  EXPECT_NEAR(other, (areas[{2, 0}]), 0.01);
+  EXPECT_LE(other, 10 * 20 + 2 * (3 * 20 + 3 * 10));
+  EXPECT_GE(other, 9 * 18 + 2 * (2.5 * 18 + 2.5 * 9));
+}
+
+TEST(LabelWalls, OfABallThatAPlaneCutsAreADiscAndTwoHalves) {
+  constexpr double kRadius = 11.3;
+  auto volume = test::constant<std::uint8_t>(0, {28, 28, 28});
+  for (std::uint32_t z = 0; z < 28; ++z) {
+    for (std::uint32_t y = 0; y < 28; ++y) {
+      for (std::uint32_t x = 0; x < 28; ++x) {
+        if (std::hypot(x - 13.5, y - 13.5, z - 13.5) < kRadius) volume.at(x, y, z) = x < 14 ? 1 : 2;
+      }
+    }
+  }
+  // The plane is one of the lattice; around the disc, where three labels meet, walls are bevelled.
+  const double disc = std::numbers::pi * kRadius * kRadius;
+  WallAreas areas = walls_between(separated(volume, {.labels = {1, 2}}));
+  ASSERT_EQ(areas.size(), 3U);
+  EXPECT_NEAR((areas[{1, 2}]), disc, 0.08 * disc);
+
+  const SeparateOptions options = {.labels = {1, 2}, .regularize = true};
+  const Lattice<std::uint8_t> lattice = volume.lattice();
+  const SurfaceCount count = count_walls(lattice, options, {});
+  SeparatingSurface surface;
+  extract_walls(lattice, options, count, {}, surface);
+  remove_stairs(lattice, options, count, 10, {}, surface);
+  areas = walls_between(surface);
+  EXPECT_NEAR((areas[{1, 0}]), 2 * disc, 0.03 * 2 * disc);
+  EXPECT_NEAR((areas[{2, 0}]), 2 * disc, 0.03 * 2 * disc);
+}
+
+TEST(LabelWalls, AddUpToEachLabelsAreaOnAnyNumberOfThreads) {
+  const SeparatingSurface surface =
+      separated(label_noise(5, {9, 8, 7}, 3), {.labels = {1, 2, 3, 4}, .close = true});
+  const WallAreas areas = walls_between(surface);
+  const auto measures = measure_labels(surface, LabelTriangles(surface), {});
+  double all = 0;
+  std::vector<double> own(5, 0);
+  for (const auto& [sides, area] : areas) {
+    all += area;
+    own[sides.first] += area;
+    if (sides.second != 0) {
+      EXPECT_LT(sides.first, sides.second);
+      own[sides.second] += area;
+    }
+  }
+  for (std::size_t n = 0; n < 4; ++n) EXPECT_NEAR(own[n + 1], measures[n].extent.area_mm2, 1e-3);
+  EXPECT_NEAR(all, measure_extent(surface.mesh, {}).area_mm2, 1e-3);
+  test::expect_same_on_any_threads([&] { return walls_between(surface); });
+}
+
+// 1: samples 10 and 11. 2: 11 and 12. So the wall of 10 and 11 is 2's alone, that of 11 and 12 1's.
+TEST(LabelWalls, OfLabelsThatOverlapAreBetweenThoseThatEnd) {
+  auto volume = test::constant<std::uint8_t>(0, {12, 8, 8});
+  for (std::uint32_t z = 1; z < 7; ++z) {
+    for (std::uint32_t y = 1; y < 7; ++y) {
+      for (std::uint32_t x = 1; x < 10; ++x) {
+        volume.at(x, y, z) = static_cast<std::uint8_t>(10 + (x - 1) / 3);
+      }
+    }
+  }
+  WallAreas areas = walls_between(
+      separated(volume, {.labels = {1, 2}, .values = {{1, {10, 11}}, {2, {11, 12}}}}));
+  EXPECT_EQ(areas.size(), 2U);  // they touch nowhere: both end only beside the background
+  EXPECT_NEAR((areas[{1, 0}]), (areas[{2, 0}]), 1e-3);
+  for (auto& value : volume.samples) value = value == 11 ? 12 : value;
+  areas = walls_between(
+      separated(volume, {.labels = {1, 2}, .values = {{1, {10, 11}}, {2, {11, 12}}}}));
+  EXPECT_GT((areas[{1, 2}]), 25);
 }
 
 // Two boxes side by side: the mean normal along the edge of their wall would lean to the neighbour.

@@ -439,6 +439,30 @@ TEST(Stairs, DependOnlyOnWhatIsNear) {
   EXPECT_GT(same, 1000U);
 }
 
+TEST(Rings, HaveAllNeighboursInTheirOrder) {
+  constexpr std::size_t kCount = 40'000;  // several chunks
+  const Rings rings(kCount, {}, [](std::size_t i, std::vector<std::uint32_t>& list) {
+    for (std::size_t n = 0; n < i % 23; ++n) list.push_back((i * 7 + n) % kCount);
+  });
+  Buffer<std::uint64_t> numbers;
+  numbers.resize_for_overwrite(kCount);
+  for (std::size_t i = 0; i < kCount; ++i) numbers[i] = i;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    std::vector<std::uint32_t> seen;
+    rings.visit(i, [&](std::uint32_t each) {
+      if (each != kCount) seen.push_back(each);
+    });
+    ASSERT_EQ(seen.size(), i % 23);
+    ASSERT_EQ(rings.degree(i), seen.size());
+    std::uint64_t sum = 0;
+    for (std::size_t n = 0; n < seen.size(); ++n) {
+      ASSERT_EQ(seen[n], (i * 7 + n) % kCount);
+      sum += seen[n];
+    }
+    ASSERT_EQ(rings.sum(i, numbers), sum);
+  }
+}
+
 TEST(Stairs, OfNothingAreNothing) {
   const Labels empty = test::constant<std::uint8_t>(0, {5, 5, 5});
   const Smoothed smoothed = without_stairs(empty, joined(1));

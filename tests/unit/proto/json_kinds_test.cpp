@@ -66,10 +66,14 @@ TEST(JobJson, TellsTheNumberOfManyLabelsOnly) {
   job.mesh->labels.clear();
   job.mesh->labels_count = 257;
   job.mesh->label_list = {9, "aa"};
+  job.mesh->walls_count = 700;
+  job.mesh->wall_list = {24 * 700, "bb"};
   EXPECT_EQ(job_from_record(to_record(job)).mesh, job.mesh);
   told = job_from_json(to_json(job));
   EXPECT_EQ(told.mesh->labels_count, 257U);
+  EXPECT_EQ(told.mesh->walls_count, 700U);
   EXPECT_FALSE(told.mesh->label_list);
+  EXPECT_FALSE(told.mesh->wall_list);
 }
 
 // --- The error -----------------------------------------------------------------------------------

@@ -161,19 +161,20 @@ TEST_P(JobConformance, AJobWithoutAMeshKeepsItsLastProgress) {
             JobState::kCancelled);
 }
 
-TEST_P(JobConformance, TheFileOfManyLabelsBelongsToItsMesh) {
-  Outcome outcome = some_mesh();
-  outcome.mesh->labels_count = 300;
-  outcome.mesh->label_list = {9, put_blob("the pages")};
-  const std::string key = outcome.mesh->label_list->sha256;
-  const JobParameters parameters = unlike();
-  const std::string id = submit(parameters).id;
-  EXPECT_TRUE(jobs().finish(claimed(), outcome));
-  EXPECT_EQ(jobs().get("", id).mesh->label_list, outcome.mesh->label_list);
-  EXPECT_TRUE(volumes().names(key));
-  EXPECT_TRUE(submit(parameters).reused);
-  blobs().erase(key);
-  EXPECT_FALSE(submit(parameters).reused);
+TEST_P(JobConformance, TheFilesOfLabelsAndWallsBelongToTheirMesh) {
+  for (const auto list : {&MeshSummary::label_list, &MeshSummary::wall_list}) {
+    Outcome outcome = some_mesh();
+    *outcome.mesh.*list = {9, put_blob("the pages")};
+    const std::string key = (*outcome.mesh.*list)->sha256;
+    const JobParameters parameters = unlike();
+    const std::string id = submit(parameters).id;
+    EXPECT_TRUE(jobs().finish(claimed(), outcome));
+    EXPECT_EQ(*jobs().get("", id).mesh.*list, *outcome.mesh.*list);
+    EXPECT_TRUE(volumes().names(key));
+    EXPECT_TRUE(submit(parameters).reused);
+    blobs().erase(key);
+    EXPECT_FALSE(submit(parameters).reused);
+  }
 }
 
 TEST_P(JobConformance, AnErrorEndsItFailed) {

@@ -103,6 +103,7 @@ describe('while the server is busy', () => {
     const job = await client.follow(submitted);
     expect((await client.meshOf(job, 'glb')).byteLength).toBe(4);
     await client.labelsOfJob(id);
+    await client.wallsOfJob(id);
     await client.labelsOf(id, 0);
     await client.cancelJob(id);
     // A job that has ended meanwhile is not to be erased.

@@ -62,6 +62,10 @@ describe('the labels of a job', () => {
     expect((await client.labelsOfJob(id)).map(({ label }) => label)).toEqual([1, 2, 3]);
     expect(first.asked.length).toBe(2);
   });
+
+  it('have walls, which come from all pages', async () => {
+    expect((await client.wallsOfJob(id)).map(({ b }) => b)).toEqual([null, 4]);
+  });
 });
 
 describe('the mesh of a job', () => {

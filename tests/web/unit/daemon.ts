@@ -72,6 +72,9 @@ export class Daemon {
       response.end('glTF');
     } else if (path === `/v1/jobs/${id}/labels`) {
       response.end(JSON.stringify(isLast ? { labels: [{ label: 3 }], next: null } : { labels: [{ label: 1 }, { label: 2 }], next: 'the rest' }));
+    } else if (path === `/v1/jobs/${id}/walls`) {
+      const walls = isLast ? [{ a: 3, b: 4, area_mm2: 1 }] : [{ a: 3, b: null, area_mm2: 2 }];
+      response.end(JSON.stringify({ walls, next: isLast ? null : 'the rest' }));
     } else if (path === `/v1/volumes/${id}/labels`) {
       const labels = isLast ? [{ label: 3 }] : [{ label: 1 }, { label: 2 }];
       response.end(JSON.stringify({ volume: id, background: 0, labels, next: isLast ? null : 'the rest' }));

@@ -18,6 +18,7 @@ UPLOADED: Members = {
 }
 HISTOGRAM: Members = {"counts": list}
 LABEL: Members = {"label": int}
+WALL: Members = {"a": (int, str), "area_mm2": (int, float)}
 ESTIMATE: Members = {"triangles": int}
 JOB: Members = {"id": str, "state": str, "volume": str, "mesh": (_MESH, _NULL), "error": (dict, _NULL)}
 SUCCEEDED_JOB: Members = {"mesh": _MESH}

@@ -719,6 +719,9 @@ class MeshSummary(TypedDict):
     labels: NotRequired[Sequence[LabelSummary]]
     #: The number of labels, only if there are more than 256. /v1/jobs/{id}/labels lists them.
     labels_count: NotRequired[int]
+    #: For a job by labels: how many pairs of labels touch, or of a label and the background.
+    #: /v1/jobs/{id}/walls lists them. A job of an older server does not have it.
+    walls_count: NotRequired[int]
     certificate: NotRequired[MeshCertificate]
 
 
@@ -770,6 +773,23 @@ class DistanceSummary(TypedDict):
     p99_mm: float
     #: The number of points in equal bins from 0 to max_mm.
     histogram: Sequence[int]
+
+
+class WallSummary(TypedDict):
+    """The area where two labels touch, or where a label is next to the background, after
+    smoothing. What closes a label at the volume's border with close is next to the background,
+    too. The areas of a label's walls add up to the area of its surface, and those of all walls
+    to the area of the mesh. Only where labels overlap they may be more: a triangle counts for
+    each pair of a label that ends there on one side and a label that ends there on the other
+    side."""
+
+    a: int
+    #: The other label, the greater number. Null for the background.
+    b: Optional[int]
+    area_mm2: float
+    a_name: Optional[str]
+    #: Null also for the background.
+    b_name: Optional[str]
 
 
 class LabelSummary(TypedDict):

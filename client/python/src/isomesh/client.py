@@ -312,6 +312,12 @@ class Client:
         pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
         return cast("Iterator[api.LabelSummary]", pages)
 
+    def job_walls(self, job: Union[str, AnyJob]) -> Iterator[api.WallSummary]:
+        """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None.
+        In ascending order of labels."""
+        pages = self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, {})
+        return cast("Iterator[api.WallSummary]", pages)
+
     def report(self, job: Union[str, AnyJob]) -> api.JobReport:
         """What a succeeded job made, of what and how: to keep beside its mesh."""
         return cast("api.JobReport", self._exchange.get(f"{_job_path(job)}/report", answers.REPORT))

@@ -29,6 +29,8 @@ import type {
   Volume,
   VolumeLabels,
   VolumeList,
+  WallList,
+  WallSummary,
 } from './types';
 import { upload } from './upload';
 
@@ -201,6 +203,17 @@ export class Client {
   /** What a finished job made, of what and how. */
   reportOf(id: string, signal?: GlobalAbortSignal): Promise<JobReport> {
     return this.connection.json(`${jobPath(id)}/report`, { signal });
+  }
+
+  /** Lists the areas where two labels of a finished job touch, or one is next to the background, whose `b` is null. */
+  async wallsOfJob(id: string, signal?: GlobalAbortSignal): Promise<WallSummary[]> {
+    const walls: WallSummary[] = [];
+    for (let cursor: string | null = ''; cursor !== null; ) {
+      const page: WallList = await this.connection.json(`${jobPath(id)}/walls${queryOf({ cursor })}`, { signal });
+      walls.push(...page.walls);
+      cursor = page.next;
+    }
+    return walls;
   }
 
   /** Erases a job that has ended, and its files. */
