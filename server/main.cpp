@@ -254,7 +254,9 @@ int run(const Options& options, const sigset_t& signals) {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::JobProgram job_program = {
       .file = program_of_ours("isomesh-job"),
-      .setup = {.threads = mesh::thread_count(), .memory_bytes = limits.memory_bytes}};
+      .setup = {.threads = mesh::thread_count(),
+                .memory_bytes = limits.memory_bytes,
+                .scratch = std::filesystem::canonical(folder.scratch()).string()}};
   const jobs::Housekeeper housekeeper(retention, library, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
   jobs::LabelLists labels(blobs);

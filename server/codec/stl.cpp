@@ -1,12 +1,13 @@
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
+#include "server/codec/facet_file.h"
 #include "server/codec/space.h"
 #include "server/mesh/points.h"
 
@@ -38,30 +39,45 @@ void write_facet(const mesh::Mesh& mesh, Space space, const mesh::Triangle& tria
   std::memset(out, 0, 2);  // attribute byte count
 }
 
-}  // namespace
-
-std::optional<mesh::Topology> encode_stl(const FileContent& content, const mesh::Context& context,
-                                         const Sink& sink) {
-  const mesh::Mesh& mesh = content.mesh;
-  const std::size_t triangles = mesh.triangles.size();
+std::vector<std::byte> head_of(Space space, const LengthUnit& unit, std::uint64_t triangles) {
   if (triangles > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge,
                 "The surface has more triangles than an STL file can hold. Set \"triangles\" to "
                 "simplify it.");
   }
   // The header must not start with "solid": readers would assume a text file.
-  const std::string title = "isomesh binary STL, " + std::string(content.unit.name) +
-                            ", SPACE=" + std::string(letters_of(content.space));
-  std::array<std::byte, kHeaderBytes + 4> header = {};
-  std::memcpy(header.data(), title.data(), title.size());
+  const std::string title =
+      "isomesh binary STL, " + std::string(unit.name) + ", SPACE=" + std::string(letters_of(space));
+  std::vector<std::byte> head(kHeaderBytes + 4);
+  std::memcpy(head.data(), title.data(), title.size());
   const auto count = static_cast<std::uint32_t>(triangles);
-  std::memcpy(header.data() + kHeaderBytes, &count, sizeof count);
-  sink(header);
+  std::memcpy(head.data() + kHeaderBytes, &count, sizeof count);
+  return head;
+}
 
+std::byte* write_facets(const mesh::Mesh& mesh, Space space, std::size_t begin, std::size_t end,
+                        std::byte* out) {
+  for (std::size_t t = begin; t < end; ++t, out += kFacetBytes) {
+    write_facet(mesh, space, mesh.triangles[t], out);
+  }
+  return out;
+}
+
+}  // namespace
+
+const FacetFile* facet_file_of(MeshFormat format) {
+  static constexpr FacetFile kStl = {head_of, kFacetBytes, write_facets};
+  return format == MeshFormat::kStl ? &kStl : nullptr;
+}
+
+std::optional<mesh::Topology> encode_stl(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
+  const mesh::Mesh& mesh = content.mesh;
+  const std::size_t triangles = mesh.triangles.size();
+  sink(head_of(content.space, content.unit, triangles));
   BlockWriter(context, sink, triangles)
       .write(triangles, kFacetBytes, [&](std::size_t t, std::byte* out) {
-        write_facet(mesh, content.space, mesh.triangles[t], out);
-        return out + kFacetBytes;
+        return write_facets(mesh, content.space, t, t + 1, out);
       });
   return std::nullopt;
 }

@@ -292,10 +292,11 @@ void confine_ahead() { confine_process(Doing::kNothing); }
 
 void confine_ahead_to_talk() { confine_process(Doing::kTalk); }
 
-void confine_job() {
+void confine_job(std::uint64_t file_bytes) {
   drop_capabilities();
   confine_process(Doing::kThreads);
-  limit(RLIMIT_FSIZE, 0);
+  limit(RLIMIT_FSIZE, file_bytes);
+  std::signal(SIGXFSZ, SIG_IGN);  // as in limit_resources()
   restrict_files({}, {});
 }
 

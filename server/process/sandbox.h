@@ -33,11 +33,11 @@ void confine_ahead_to_talk();
 // above. Call once. Throws as they do; a kernel without Landlock is not an error.
 void confine_to(const Confinement& confinement);
 
-// Confines a long-running process with threads. It may open no files and write none, and has no
-// capabilities even as root. It has the calls of confine_ahead(), those that create threads, and
-// those that receive descriptors, its only input. Throws as that does. Call once, before a second
-// thread is started, and instead of the functions above.
-void confine_job();
+// Confines a long-running process with threads. It may open no files, write at most so much to each
+// that it has open, and has no capabilities even as root. It has the calls of confine_ahead(),
+// those that create threads, and those that receive descriptors, its only input. Throws as that
+// does. Call once, before a second thread is started, and instead of the functions above.
+void confine_job(std::uint64_t file_bytes = 0);
 
 // Limits the process's memory (RLIMIT_DATA) repeatedly. All of its memory is private: a confined
 // process cannot map memory that this limit does not count. Construct it before the process is

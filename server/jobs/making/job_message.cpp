@@ -11,6 +11,7 @@ constexpr JobOrder::Work last_of(JobOrder::Work /*value*/) { return JobOrder::Wo
 void visit(Is<JobSetup> auto& self, auto&& field) {
   field("threads", self.threads);
   field("memory_bytes", self.memory_bytes);
+  field("scratch", self.scratch);
 }
 
 void visit(Is<JobOrder> auto& self, auto&& field) {

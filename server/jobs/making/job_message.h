@@ -23,6 +23,7 @@ namespace isomesh::jobs {
 struct JobSetup {
   int threads = 1;                                      // of the kernels
   std::uint64_t memory_bytes = std::uint64_t{1} << 60;  // the most of an order
+  std::string scratch = {};  // the folder for what orders set aside; empty: they keep it in memory
 };
 
 struct JobOrder {

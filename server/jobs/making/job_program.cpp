@@ -1,10 +1,12 @@
 // isomesh-job: makes the meshes of one worker, one after the other, in memory that stays mapped. It
-// reads volumes that it receives open and writes no file: results go to the daemon over the socket.
+// reads volumes that it receives open, and results go to the daemon over the socket. The one file
+// that it writes has no name, and is for what it sets aside.
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <new>
 #include <optional>
 #include <span>
@@ -26,6 +28,7 @@
 #include "server/jobs/making/make_labels.h"
 #include "server/jobs/making/make_mesh.h"
 #include "server/jobs/making/memory.h"
+#include "server/jobs/making/spool_file.h"
 #include "server/mesh/parallel.h"
 #include "server/process/child.h"
 #include "server/process/passing.h"
@@ -182,7 +185,23 @@ void send_lists(Speaker& speaker, std::size_t file, const std::vector<mesh::Wall
   summary.labels.clear();
 }
 
-MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+// The memory and the disk that orders use one after the other.
+struct Place {
+  Workspace workspace;
+  std::optional<SpoolFile> spool;
+
+  // Without a spool, as on a disk that is full, orders keep in memory what they would set aside,
+  // and are rejected if that is too much.
+  void open_spool(const std::filesystem::path& folder) {
+    try {
+      spool.emplace(folder);
+    } catch (const Error&) {
+      spool.reset();
+    }
+  }
+};
+
+MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Place& place) {
   const JobOrder& order = task.order;
   Reporter reporter(speaker);
   const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
@@ -205,12 +224,13 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   MeshRequest request = request_of(order, volume);
   const SampleArray& samples = cropped.array();
   request.memory_bytes -= std::min(request.memory_bytes, cropped.rounded_bytes());
+  if (place.spool) request.spool = &*place.spool;
   if (order.parameters.labels) {
-    MadeLabels labels = make_labels(samples, request, sinks, progress, workspace.walls);
+    MadeLabels labels = make_labels(samples, request, sinks, progress, place.workspace.walls);
     made.summary = std::move(labels.summary);
     send_lists(speaker, sinks.size(), labels.walls, made.summary);
   } else {
-    made.summary = make_mesh(samples, request, sinks, progress, workspace.mesh);
+    made.summary = make_mesh(samples, request, sinks, progress, place.workspace.mesh);
   }
   progress.end_stage();
   made.timing = progress.timing();
@@ -233,12 +253,12 @@ struct Ending {
 };
 
 // Every exception becomes a message here, because nothing else leaves this process.
-Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Place& place) {
   const std::uint64_t memory_bytes = task.order.memory_bytes;
   try {
     const bool is_count = task.order.work == JobOrder::Work::kCount;
     if (is_count) return {count(std::move(task), stop, speaker)};
-    return {make(std::move(task), stop, speaker, workspace)};
+    return {make(std::move(task), stop, speaker, place)};
   } catch (const Error& error) {
     return {error};
   } catch (const std::bad_alloc&) {
@@ -282,18 +302,20 @@ int main() {
   const std::uint64_t headroom =
       kHeadroomBytes + kThreadBytes * static_cast<std::uint64_t>(setup.threads);
   const process::MemoryLimit memory(setup.memory_bytes + kept_bytes(setup.memory_bytes) + headroom);
-  process::confine_job();
+  Place place;
+  if (!setup.scratch.empty()) place.open_spool(setup.scratch);
+  process::confine_job(setup.memory_bytes);
   mesh::set_thread_count(setup.threads);
   Desk desk;
   const std::jthread reader([&] { read_orders(lines, desk); });
   Speaker speaker;
-  Workspace workspace;
   for (;;) {
     auto [task, stop] = desk.take();
     const std::uint64_t memory_bytes = task.order.memory_bytes;
     memory.set(memory_bytes + headroom);
-    const Ending ending = work(std::move(task), stop, speaker, workspace);
-    if (!ending.is_last) workspace.trim(kept_bytes(memory_bytes));
+    const Ending ending = work(std::move(task), stop, speaker, place);
+    if (!ending.is_last) place.workspace.trim(kept_bytes(memory_bytes));
+    if (place.spool) place.spool->clear();
     speaker.say(ending.answer);
     if (ending.is_last) std::_Exit(EXIT_SUCCESS);
   }

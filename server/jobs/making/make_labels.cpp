@@ -168,7 +168,7 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
       mesh::chosen_labels(count_values(samples, progress.context().part(0, 0.2)), parameters);
   const mesh::SeparateOptions options = separate_options(labels, parameters);
   const mesh::SurfaceCount count = separate(samples, options, request, progress, walls);
-  if (!is_simplified(parameters)) check_disk(walls.mesh, request);
+  if (!is_simplified(parameters)) check_disk(size_of(walls.mesh), request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
   ExtractedSurface extracted(request, walls.mesh);
 
@@ -177,8 +177,8 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, walls.mesh, &walls, summary);
-  set_size(walls.mesh, summary);
-  if (is_simplified(parameters)) check_disk(walls.mesh, request);
+  set_size(size_of(walls.mesh), summary);
+  if (is_simplified(parameters)) check_disk(size_of(walls.mesh), request);
   summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};
 
   progress.enter(Stage::kEncode);

@@ -12,6 +12,7 @@
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
+#include "server/jobs/making/walk_stage.h"
 #include "server/mesh/measure/cavities.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/topology/components.h"
@@ -34,15 +35,6 @@ void extract(const SampleArray& samples, const MeshRequest& request, const Progr
     check_memory(size_of(count), lattice.dims.samples(), request);
     extract_surface(lattice, options, count, context.part(kCounting, 1), mesh);
   });
-}
-
-void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
-  summary.boundary_edges = topology.boundary_edges;
-  summary.components = topology.components;
-  summary.euler = topology.euler;
-  summary.quality.manifold = topology.manifold;
-  summary.quality.oriented = topology.oriented;
-  conclude_quality(summary);
 }
 
 bool shows_topology(const MeshParameters& parameters) {
@@ -99,19 +91,34 @@ Progress::Progress(std::stop_token stop, const Report& report, const Timing& exp
   }
 }
 
-void Progress::enter(Stage stage) {
+void Progress::enter(Stage stage, std::span<const Stage> meanwhile) {
   end_stage();
   stage_ = stage;
   done_before_ += share_;
-  share_ = expected_ms_ > 0 ? expected_.*row_of(stage).elapsed / expected_ms_ : 0;
+  double expected_ms = expected_.*row_of(stage).elapsed;
+  for (const Stage other : meanwhile) expected_ms += expected_.*row_of(other).elapsed;
+  share_ = expected_ms_ > 0 ? expected_ms / expected_ms_ : 0;
   began_ = Clock::now();
   report_(stage_, done_before_, timing_);
 }
 
 void Progress::end_stage() {
   if (stage_ == Stage::kQueue) return;  // nothing has begun
-  timing_.*row_of(stage_).elapsed =
-      std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
+  timing_.*row_of(stage_).elapsed += elapsed_ms();
+}
+
+void Progress::share_out(std::span<const Seconds> spent) {
+  const double elapsed = elapsed_ms();
+  began_ = Clock::now();
+  double sum = 0;
+  for (const auto& [stage, seconds] : spent) sum += seconds;
+  for (const auto& [stage, seconds] : spent) {
+    timing_.*row_of(stage).elapsed += sum > 0 ? elapsed * seconds / sum : 0;
+  }
+}
+
+double Progress::elapsed_ms() const {
+  return std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
 }
 
 CountedSurface count_surface(const SampleArray& samples, const MeshRequest& request,
@@ -133,12 +140,13 @@ void Workspace::trim(std::size_t budget_bytes) {
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
+  if (is_walked(parameters, request.certify)) return walk_stage(samples, request, sinks, progress);
   MeshSummary summary;
   summary.iso = request.iso;
   progress.enter(Stage::kExtract);
   extract(samples, request, progress, mesh);
   leave_out_parts(parameters, progress, mesh, summary.dropped);
-  if (!is_simplified(parameters)) check_disk(mesh, request);
+  if (!is_simplified(parameters)) check_disk(size_of(mesh), request);
   ExtractedSurface extracted(request, mesh);
 
   smooth_stage(samples, request, progress, mesh, summary);
@@ -146,8 +154,8 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters as_written = with_bits_for(parameters, mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, mesh, nullptr, summary);
-  set_size(mesh, summary);
-  if (is_simplified(parameters)) check_disk(mesh, request);
+  set_size(size_of(mesh), summary);
+  if (is_simplified(parameters)) check_disk(size_of(mesh), request);
 
   progress.enter(Stage::kEncode);
   const KeptFiles files(written, sinks);

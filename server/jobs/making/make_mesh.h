@@ -10,6 +10,7 @@
 #include <span>
 #include <stop_token>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "proto/types.h"
@@ -18,6 +19,7 @@
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/spool.h"
 
 namespace isomesh::jobs {
 
@@ -31,8 +33,11 @@ class Progress {
   // A stage's share of the job is its share of the expected times; 0 if none is expected.
   Progress(std::stop_token stop, const Report& report, const Timing& expected);
 
-  // Ends the previous stage and starts this one.
-  void enter(Stage stage);
+  // Ends the previous stage and starts this one, with those that run at the same time.
+  void enter(Stage stage, std::span<const Stage> meanwhile = {});
+  // Shares out the time of the present stage so far, as the seconds of its threads say.
+  using Seconds = std::pair<Stage, double>;
+  void share_out(std::span<const Seconds> spent);
   void end_stage();
 
   // For the present stage.
@@ -46,6 +51,8 @@ class Progress {
   const Timing& timing() const { return timing_; }
 
  private:
+  double elapsed_ms() const;
+
   std::stop_token stop_;
   const Report& report_;
   const Timing expected_;
@@ -76,10 +83,12 @@ struct MeshRequest {
   std::uint64_t memory_bytes;
   // For all files together, if the disk held nothing else.
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
+  // For what would take much memory; null: it does.
+  mesh::Spool* spool = nullptr;
 
   // The same with other parameters, which must outlive it.
   MeshRequest with(const MeshParameters& others) const {
-    return {volume, others, iso, certify, memory_bytes, disk_bytes};
+    return {volume, others, iso, certify, memory_bytes, disk_bytes, spool};
   }
 };
 

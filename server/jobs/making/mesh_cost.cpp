@@ -4,18 +4,36 @@
 #include <string>
 #include <vector>
 
+#include "server/codec/facet_file.h"
 #include "server/codec/formats.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/mesh/labels/label_parts.h"
 #include "server/mesh/labels/separate.h"
+#include "server/mesh/parallel.h"
 #include "server/mesh/smooth/untangle.h"
 #include "server/mesh/stairs/stairs.h"
+#include "server/mesh/walk/walk.h"
 
 namespace isomesh::jobs {
 namespace {
 
 std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
   return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle);
+}
+
+// The memory of a job that never has the surface as a whole: the walk, the joined crossings that
+// are counted and not set aside yet, and for each thread the parts of files that wait for their
+// turn and the corners of some layers' triangles, whose fans it looks at.
+std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
+                           const MeshParameters& parameters) {
+  constexpr std::uint64_t kJoinedPerVertex = 3;
+  constexpr std::uint64_t kParts = std::uint64_t{6} << 20;
+  constexpr std::uint64_t kCornersPerVertex = 5 * 2 * 3 * 8;
+  const std::uint64_t planes = std::max<std::uint64_t>(1, surface.layers);
+  const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
+  return mesh::walking_memory(smooth_options(parameters), surface, samples / planes) +
+         (parameters.regularize ? surface.vertices * kJoinedPerVertex : 0) +
+         threads * (kParts + std::min(surface.vertices, surface.largest_layer) * kCornersPerVertex);
 }
 
 // The memory of labels beside their walls: the sides of the triangles, the lists of each label's
@@ -80,6 +98,14 @@ bool is_regularized(const MeshParameters& parameters) {
   return parameters.regularize && (parameters.labels || !parameters.max_error_mm);
 }
 
+bool is_walked(const MeshParameters& parameters, bool certify) {
+  const bool is_whole = parameters.labels || certify || parameters.max_error_mm ||
+                        parameters.triangles || parameters.untangle || parameters.fill_cavities ||
+                        !parameters.components.keeps_all();
+  return !is_whole && mesh::can_walk(smooth_options(parameters)) &&
+         std::ranges::all_of(files_of(parameters), codec::facet_file_of);
+}
+
 bool removes_stairs(const MeshParameters& parameters) {
   return mesh::method_of(parameters.smoothing).removes_stairs() && parameters.passes > 0;
 }
@@ -95,6 +121,7 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                               const MeshParameters& parameters, bool certify) {
+  if (is_walked(parameters, certify)) return walked_bytes(surface, samples, parameters);
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);
@@ -121,8 +148,7 @@ void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                   std::to_string(allowed_bytes / kMebibyte) + " MiB are allowed");
 }
 
-void check_disk(const mesh::Mesh& mesh, const MeshRequest& request) {
-  const mesh::SurfaceSize surface = {mesh.triangles.size(), mesh.positions.size()};
+void check_disk(const mesh::SurfaceSize& surface, const MeshRequest& request) {
   const std::uint64_t needed = least_file_bytes(surface, request.parameters);
   const std::uint64_t allowed_bytes = request.disk_bytes;
   if (needed <= allowed_bytes) return;

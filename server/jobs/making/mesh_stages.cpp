@@ -23,11 +23,6 @@ namespace {
 // the plane itself their triangles would lie on the cap's.
 constexpr double kBesideCaps = 1e-3;
 
-void set_final(const mesh::Shapes& shapes, MeshQuality& quality) {
-  quality.aspect_ratio.smoothed = shapes.aspect_ratio;
-  quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
-}
-
 // The half spaces between the caps of a closed surface. Only steps away from the mean could leave
 // them.
 std::vector<mesh::HalfSpace> sides_of_caps(const SampleArray& samples,
@@ -128,8 +123,7 @@ std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& param
 
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary) {
-  mesh::SmoothOptions options = smooth_options(request.parameters);
-  options.within = sides_of_caps(samples, request.parameters, options);
+  const mesh::SmoothOptions options = smoothing_of(samples, request.parameters);
   const auto smooth = [&](const mesh::Context& context) {
     return mesh::smooth(options, context, mesh);
   };
@@ -140,14 +134,38 @@ void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& me
                   MeshSummary& summary) {
   progress.enter(Stage::kSmooth);
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
+  set_smoothing(extracted, smooth(progress.context()), summary);
+}
+
+mesh::SmoothOptions smoothing_of(const SampleArray& samples, const MeshParameters& parameters) {
+  mesh::SmoothOptions options = smooth_options(parameters);
+  options.within = sides_of_caps(samples, parameters, options);
+  return options;
+}
+
+void set_smoothing(const mesh::Shapes& extracted, const mesh::SmoothingEffect& effect,
+                   MeshSummary& summary) {
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
   set_final(extracted, summary.quality);
-  const mesh::SmoothingEffect effect = smooth(progress.context());
   summary.area_extracted_mm2 = effect.before.area_mm2;
   summary.displacement_mm = {effect.mean_displacement_mm, effect.max_displacement_mm};
   summary.volume_mm3.extracted = effect.before.volume_mm3;
   set_extent(effect.after, summary);
+}
+
+void set_final(const mesh::Shapes& shapes, MeshQuality& quality) {
+  quality.aspect_ratio.smoothed = shapes.aspect_ratio;
+  quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
+}
+
+void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
+  summary.boundary_edges = topology.boundary_edges;
+  summary.components = topology.components;
+  summary.euler = topology.euler;
+  summary.quality.manifold = topology.manifold;
+  summary.quality.oriented = topology.oriented;
+  conclude_quality(summary);
 }
 
 void untangle_stage(const MeshParameters& parameters, ExtractedSurface& extracted,
@@ -199,9 +217,13 @@ void measure_final_shapes(const MeshParameters& parameters, const Progress& prog
   set_final(measure_shapes(mesh, progress.quiet()), quality);
 }
 
-void set_size(const mesh::Mesh& mesh, MeshSummary& summary) {
-  summary.triangles = mesh.triangles.size();
-  summary.vertices = mesh.positions.size();
+mesh::SurfaceSize size_of(const mesh::Mesh& mesh) {
+  return {.triangles = mesh.triangles.size(), .vertices = mesh.positions.size()};
+}
+
+void set_size(const mesh::SurfaceSize& surface, MeshSummary& summary) {
+  summary.triangles = surface.triangles;
+  summary.vertices = surface.vertices;
   summary.empty = summary.triangles == 0;
 }
 

@@ -16,10 +16,12 @@
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/lattice/placement.h"
+#include "server/mesh/measure/shapes.h"
 #include "server/mesh/measure/surface_view.h"
 #include "server/mesh/measure/triangle_grid.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/smooth/smooth.h"
+#include "server/mesh/topology/topology.h"
 
 namespace isomesh::jobs {
 
@@ -49,6 +51,16 @@ std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& param
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary);
 
+// The options of smooth_stage.
+mesh::SmoothOptions smoothing_of(const SampleArray& samples, const MeshParameters& parameters);
+
+// Writes the effect of smoothing, and the shapes before, into the summary; those also as the final
+// ones.
+void set_smoothing(const mesh::Shapes& extracted, const mesh::SmoothingEffect& effect,
+                   MeshSummary& summary);
+void set_final(const mesh::Shapes& shapes, MeshQuality& quality);
+void set_topology(const mesh::Topology& topology, MeshSummary& summary);
+
 // Uses another function for smoothing.
 using Smooth = std::function<mesh::SmoothingEffect(const mesh::Context&)>;
 void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& mesh,
@@ -72,7 +84,8 @@ void measure_final_shapes(const MeshParameters& parameters, const Progress& prog
                           const mesh::Mesh& mesh, MeshQuality& quality);
 
 // Writes the size of the mesh into the summary.
-void set_size(const mesh::Mesh& mesh, MeshSummary& summary);
+mesh::SurfaceSize size_of(const mesh::Mesh& mesh);
+void set_size(const mesh::SurfaceSize& surface, MeshSummary& summary);
 
 // Sets what follows from other members: the genus, and whether volumes are meaningful.
 void conclude_quality(MeshSummary& summary);

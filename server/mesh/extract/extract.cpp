@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "proto/samples.h"
+#include "server/mesh/extract/joined_layers.h"
 #include "server/mesh/extract/slab_passes.h"
+#include "server/mesh/extract/windows.h"
 #include "server/mesh/lattice/bcc_faces.h"
 
 namespace isomesh::mesh {
@@ -29,6 +31,10 @@ std::optional<T> smallest_inside(double iso) {
                ? nearest
                : std::nextafter(nearest, std::numeric_limits<T>::infinity());
   }
+}
+
+std::size_t places_of(const ExtractOptions& options) {
+  return options.scheme == Scheme::kBcc ? kBccPlaces : kEdgePlaces;
 }
 
 }  // namespace
@@ -103,14 +109,58 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
 
   Extraction extraction(lattice, options, *smallest);
   if (options.regularize) extraction.keep(count.clusters);
-  const std::size_t places = options.scheme == Scheme::kBcc ? kBccPlaces : kEdgePlaces;
-  write_pass(extraction, places, context, mesh, mesh);
+  write_pass(extraction, places_of(options), context, mesh, mesh);
 }
+
+template <class T>
+SurfaceWindows::SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& options,
+                               const Context& context, Spool* spool)
+    : close_(options.close),
+      origin_(lattice.to_space.origin),
+      count_(empty_count(marched_dims(lattice.dims, options.close).z)),
+      joined_(std::make_unique<JoinedLayers>(count_.clusters, spool)) {
+  const auto smallest = smallest_inside<T>(options.iso);
+  context.throw_if_stopped();
+  if (!lattice.dims.has_cells() || !smallest) return;
+  extraction_ = std::make_unique<Extraction>(lattice, options, *smallest);
+  if (options.regularize) count_.clusters.resize(extraction_->dims.z);
+  joined_->prepare();
+  count_pass(*extraction_, context, count_,
+             [&](const Slab& slab) { joined_->put_aside(slab.begin, slab.end); });
+  prefix_pass(count_);
+  if (options.regularize) extraction_->keep(count_.clusters);
+  memory_ = std::make_unique<IndexMemory>(index_memory_size(extraction_->dims, places_of(options)));
+}
+
+SurfaceWindows::~SurfaceWindows() = default;
+
+void SurfaceWindows::write(std::uint32_t begin, std::uint32_t end, Mesh& mesh) {
+  mesh.origin = origin_;
+  const auto offsets = [&](const std::vector<std::uint64_t>& sums, std::uint32_t behind,
+                           std::vector<std::uint64_t>& out) {
+    out.clear();
+    for (std::uint32_t z = begin; z <= end; ++z) out.push_back(sums[z] - sums[begin]);
+    out.push_back(sums[behind] - sums[begin]);
+  };
+  offsets(count_.layer_vertices, std::min(end + 1, layers()), mesh.layer_vertices);
+  offsets(count_.layer_triangles, end, mesh.layer_triangles);
+  const std::uint64_t vertices = mesh.layer_vertices.back();
+  mesh.positions.resize_for_overwrite(vertices);
+  mesh.triangles.resize_for_overwrite(mesh.layer_triangles.back());
+  mesh.on_border.assign(close_ ? (vertices + kFlagBits - 1) / kFlagBits : 0, 0);
+  if (!extraction_) return;
+  joined_->take_back(begin, end + kJoinedLayersBehind);
+  write_slab(*extraction_, {begin, end, begin}, *memory_, mesh);
+}
+
+void SurfaceWindows::forget(std::uint32_t begin, std::uint32_t end) { joined_->forget(begin, end); }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                                      \
   template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&); \
   template void extract_surface(const Lattice<T>&, const ExtractOptions&, const SurfaceCount&,   \
-                                const Context&, Mesh&);
+                                const Context&, Mesh&);                                          \
+  template SurfaceWindows::SurfaceWindows(const Lattice<T>&, const ExtractOptions&,              \
+                                          const Context&, Spool*);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

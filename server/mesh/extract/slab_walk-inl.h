@@ -95,10 +95,11 @@ class SlabWriter {
   // numbered first. The plane above the slab is numbered only: its vertices are the next slab's to
   // write.
   void write() {
-    auto vertex = static_cast<std::uint32_t>(mesh_.layer_vertices[slab_.begin]);
+    const std::size_t first = slab_.begin - slab_.first_layer;
+    auto vertex = static_cast<std::uint32_t>(mesh_.layer_vertices[first]);
     field_.reach(slab_.begin);
     for (std::uint32_t y = 0; y < dims_.y; ++y) number_row(y, slab_.begin, vertex);
-    Triangle* out = mesh_.triangles.data() + mesh_.layer_triangles[slab_.begin];
+    Triangle* out = mesh_.triangles.data() + mesh_.layer_triangles[first];
     for (std::uint32_t z = slab_.begin; z < slab_.end && z + 1 < dims_.z; ++z) {
       field_.reach(z + 1);
       number_row(0, z + 1, vertex);

@@ -19,6 +19,7 @@ namespace isomesh::mesh {
 struct Slab {
   std::uint32_t begin = 0;
   std::uint32_t end = 0;
+  std::uint32_t first_layer = 0;  // that is the first of the mesh which is written
 };
 
 // How many layers of phantoms are around the volume.
@@ -125,7 +126,9 @@ inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {
 void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count);
 
 // Pass 3, write: the slab's vertices and triangles go to their places, which mesh.layer_vertices
-// and mesh.layer_triangles tell.
+// and mesh.layer_triangles tell. Reads joined crossings of the planes [begin, end + 2), and of the
+// next plane those of the first row.
+inline constexpr std::uint32_t kJoinedLayersBehind = 3;
 void write_slab(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
 
 }  // namespace isomesh::mesh

@@ -107,14 +107,16 @@ class LayerExtent {
 };
 
 // True for the triangles that make has_flat() true.
-inline bool has_no_area(const Mesh& mesh, const Triangle& triangle) {
-  const auto corner = [&](std::size_t i) {
-    const Float4 position = load(mesh.positions[triangle[i]]);
-    return TwoPoints::of(position, position);
-  };
-  const TwoPoints at = corner(0);
-  const TwoPoints normal = (corner(1) - at).cross(corner(2) - at);
+inline bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const auto point = [](const Vec3& at) { return TwoPoints::of(load(at), load(at)); };
+  const TwoPoints at = point(a);
+  const TwoPoints normal = (point(b) - at).cross(point(c) - at);
   return normal.dot(normal)[0] == 0;
+}
+
+inline bool has_no_area(const Mesh& mesh, const Triangle& triangle) {
+  const auto& [a, b, c] = triangle;
+  return has_no_area(mesh.positions[a], mesh.positions[b], mesh.positions[c]);
 }
 
 inline void add_triangles(const Mesh& mesh, std::size_t layer, LayerExtent& extent) {

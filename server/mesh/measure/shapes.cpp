@@ -23,13 +23,6 @@ namespace isomesh::mesh {
 
 constexpr std::size_t kBlock = 256;
 
-// Blocks of triangles in the mesh's order; every step-th block is measured, from the first on.
-struct MeasuredBlocks {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  std::size_t step = 1;
-};
-
 // The measures of a run of triangles.
 struct ShapeSums {
   std::size_t triangles = 0;
@@ -47,20 +40,29 @@ struct ShapeSums {
   Sums smallest_angle_deg;
 };
 
+using Lanes = std::array<float, kBlock>;
+
+// Two sides of each triangle of a block, from its first corner.
+struct Sides {
+  alignas(64) std::array<Lanes, 3> u;
+  alignas(64) std::array<Lanes, 3> v;
+};
+
+// A surface's triangles in their order, of which every step-th block is measured, from the first
+// on.
+struct MeasuredTriangles {
+  std::uint64_t count = 0;  // of the surface
+  std::size_t step = 1;     // in blocks
+  std::uint64_t next = 0;   // the first triangle that has not been seen
+  Sides sides = {};         // of those of its block that have been
+};
+
 }  // namespace isomesh::mesh
 #endif
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 namespace {
-
-using Lanes = std::array<float, kBlock>;
-
-// Two sides of each triangle, from its first corner.
-struct Sides {
-  alignas(64) std::array<Lanes, 3> u;
-  alignas(64) std::array<Lanes, 3> v;
-};
 
 struct Values {
   alignas(64) Lanes aspect_ratio;
@@ -92,8 +94,10 @@ HWY_INLINE void store_transposed(const std::array<Float4, 4>& rows, std::size_t 
   }
 }
 
-// Four triangles at a time; the places after the last one are filled with its sides.
-void load_sides(const Mesh& mesh, std::size_t begin, std::size_t count, Sides& sides) {
+// Of the triangles from `begin` on, to the places from `at` on. Four at a time; those behind the
+// last are filled with its sides.
+void load_sides(const Mesh& mesh, std::size_t begin, std::size_t count, std::size_t at,
+                Sides& sides) {
   for (std::size_t i = 0; i < count; i += 4) {
     std::array<Float4, 4> u;
     std::array<Float4, 4> v;
@@ -103,8 +107,17 @@ void load_sides(const Mesh& mesh, std::size_t begin, std::size_t count, Sides& s
       u[k] = load(mesh.positions[b]) - corner;
       v[k] = load(mesh.positions[c]) - corner;
     }
-    store_transposed(u, i, sides.u);
-    store_transposed(v, i, sides.v);
+    if (at + i + 4 <= kBlock) {
+      store_transposed(u, at + i, sides.u);
+      store_transposed(v, at + i, sides.v);
+      continue;
+    }
+    for (std::size_t k = 0; at + i + k < kBlock; ++k) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        sides.u[axis][at + i + k] = u[k][static_cast<int>(axis)];
+        sides.v[axis][at + i + k] = v[k][static_cast<int>(axis)];
+      }
+    }
   }
 }
 
@@ -185,25 +198,27 @@ void add_values(const Lanes& values, std::size_t count, float per_bin, ShapeSums
   }
 }
 
-void measure_run(const Mesh& mesh, const MeasuredBlocks& blocks, ShapeSums& sums) {
-  constexpr float kBins = Distribution::kBins;
-  Sides sides = {};
-  Values values;
-  for (std::size_t block = blocks.begin; block < blocks.end; block += blocks.step) {
-    const std::size_t begin = block * kBlock;
-    const std::size_t count = std::min(kBlock, mesh.triangles.size() - begin);
-    sums.triangles += count;
-    load_sides(mesh, begin, count, sides);
-    measure_block(sides, values);
-    add_values(values.aspect_ratio, count, kBins, sums.aspect_ratio);
-    add_values(values.smallest_angle_deg, count, kBins / 60, sums.smallest_angle_deg);
-  }
-}
-
 }  // namespace
 
-void measure_shapes_of(const Mesh& mesh, const MeasuredBlocks& blocks, ShapeSums& sums) {
-  measure_run(mesh, blocks, sums);
+// Adds the triangles [begin, end) of the mesh.
+void measure_shapes_of(const Mesh& mesh, std::size_t begin, std::size_t end,
+                       MeasuredTriangles& surface, ShapeSums& sums) {
+  constexpr float kBins = Distribution::kBins;
+  Values values;
+  while (begin < end) {
+    const std::uint64_t block = surface.next / kBlock;
+    const std::size_t at = surface.next % kBlock;
+    const std::size_t count = std::min(kBlock - at, end - begin);
+    if (block % surface.step == 0) load_sides(mesh, begin, count, at, surface.sides);
+    begin += count;
+    surface.next += count;
+    const bool is_complete = at + count == kBlock || surface.next == surface.count;
+    if (block % surface.step != 0 || !is_complete) continue;
+    sums.triangles += at + count;
+    measure_block(surface.sides, values);
+    add_values(values.aspect_ratio, at + count, kBins, sums.aspect_ratio);
+    add_values(values.smallest_angle_deg, at + count, kBins / 60, sums.smallest_angle_deg);
+  }
 }
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE
@@ -238,22 +253,58 @@ Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSum
   return result;
 }
 
+std::size_t step_of(std::uint64_t triangles) {
+  return triangles <= kMostMeasuredTriangles ? 1 : chunks_of(triangles, kMostMeasuredTriangles / 2);
+}
+
+// The triangles whose measures are summed before they are added to those of others.
+std::uint64_t triangles_per_run(std::uint64_t triangles) {
+  return kMeasuredPerRun * step_of(triangles);
+}
+
+Shapes shapes_of(const std::vector<ShapeSums>& runs) {
+  return {summed(runs, &ShapeSums::aspect_ratio), summed(runs, &ShapeSums::smallest_angle_deg)};
+}
+
 }  // namespace
 
 Shapes measure_shapes(const Mesh& mesh, const Context& context) {
   const std::size_t triangles = mesh.triangles.size();
-  const std::size_t step =
-      triangles <= kMostMeasuredTriangles ? 1 : chunks_of(triangles, kMostMeasuredTriangles / 2);
-  const std::size_t blocks = chunks_of(triangles, kBlock);
-  const std::size_t per_run = kMeasuredPerRun / kBlock * step;
-  std::vector<ShapeSums> runs(chunks_of(blocks, per_run));
+  const std::uint64_t per_run = triangles_per_run(triangles);
+  std::vector<ShapeSums> runs(chunks_of(triangles, per_run));
   const auto measure = HWY_DYNAMIC_DISPATCH(measure_shapes_of);
   const auto measure_run = [&](std::size_t begin, std::size_t end) {
-    measure(mesh, {begin, end, step}, runs[begin / per_run]);
+    MeasuredTriangles surface = {.count = triangles, .step = step_of(triangles), .next = begin};
+    measure(mesh, begin, end, surface, runs[begin / per_run]);
   };
-  for_chunks(context, blocks, measure_run, per_run);
-  return {summed(runs, &ShapeSums::aspect_ratio), summed(runs, &ShapeSums::smallest_angle_deg)};
+  for_chunks(context, triangles, measure_run, per_run);
+  return shapes_of(runs);
 }
+
+struct ShapesSum::Sums {
+  MeasuredTriangles surface;
+  std::vector<ShapeSums> runs;
+};
+
+ShapesSum::ShapesSum(std::uint64_t triangles)
+    : sums_(std::make_unique<Sums>(Sums{
+          .surface = {.count = triangles, .step = step_of(triangles)},
+          .runs = std::vector<ShapeSums>(chunks_of(triangles, triangles_per_run(triangles)))})) {}
+
+ShapesSum::~ShapesSum() = default;
+
+void ShapesSum::add(const Mesh& mesh, std::size_t begin, std::size_t end) {
+  const std::uint64_t per_run = triangles_per_run(sums_->surface.count);
+  while (begin < end) {
+    const std::uint64_t next = sums_->surface.next;
+    const std::size_t count = std::min<std::uint64_t>(end - begin, per_run - next % per_run);
+    HWY_DYNAMIC_DISPATCH(measure_shapes_of)
+    (mesh, begin, begin + count, sums_->surface, sums_->runs[next / per_run]);
+    begin += count;
+  }
+}
+
+Shapes ShapesSum::result() const { return shapes_of(sums_->runs); }
 
 }  // namespace isomesh::mesh
 #endif

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
@@ -26,5 +28,20 @@ struct Shapes {
 
 // Does not depend on the number of threads or the processor. Throws Error kCancelled.
 Shapes measure_shapes(const Mesh& mesh, const Context& context);
+
+// The same of a surface of that many triangles that are seen a few at a time, in their order.
+class ShapesSum {
+ public:
+  explicit ShapesSum(std::uint64_t triangles);
+  ~ShapesSum();
+
+  // The triangles [begin, end) of the mesh are the surface's next.
+  void add(const Mesh& mesh, std::size_t begin, std::size_t end);
+  Shapes result() const;
+
+ private:
+  struct Sums;
+  std::unique_ptr<Sums> sums_;
+};
 
 }  // namespace isomesh::mesh

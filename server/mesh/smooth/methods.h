@@ -11,7 +11,7 @@ namespace isomesh::mesh {
 
 // How a step moves vertices. Vertices on the boundary, and on the caps of a closed surface, stay.
 enum class Move {
-  kMean,            // to the mean of the neighbours (sweep.h)
+  kMean,            // to the mean of the neighbours (layer_steps.h)
   kTangentialMean,  // the same, but along the extracted surface (quality.h)
   kBisectors,       // along it, to where spokes halve the neighbours' angles
   kLargestAngle,    // along it, to where the smallest angle is largest

@@ -13,7 +13,7 @@
 #include "server/mesh/points.h"
 #include "server/mesh/smooth/fan_moves.h"
 #include "server/mesh/smooth/rings.h"
-#include "server/mesh/smooth/sweep.h"
+#include "server/mesh/smooth/layer_steps.h"
 
 namespace isomesh::mesh {
 namespace {

@@ -7,8 +7,9 @@
 
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
+#include "server/mesh/smooth/flat_triangles.h"
+#include "server/mesh/smooth/layer_steps.h"
 #include "server/mesh/smooth/quality.h"
-#include "server/mesh/smooth/sweep.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -47,7 +48,7 @@ Plan plan_for(const SmoothOptions& options, const SurfaceSize& size) {
   const auto bytes_with = [&](std::size_t steps_at_once) {
     const auto at_once = std::min(plan.slabs, static_cast<std::size_t>(thread_count()));
     const std::uint64_t copied = plan.slabs * 2 * steps_at_once * sizeof(Vec3);
-    return size.largest_layer * (at_once * sweep_bytes_per_vertex(steps_at_once) + copied);
+    return size.largest_layer * (at_once * step_bytes_per_vertex(steps_at_once) + copied);
   };
   const std::size_t rounds = (steps + kUsualSteps - 1) / kUsualSteps;
   const std::uint64_t several =
@@ -75,19 +76,13 @@ std::vector<LayerRange> cut_slabs(const Mesh& mesh, std::size_t slabs) {
   return result;
 }
 
-LayerCopy copy_of(const Mesh& mesh, const LayerRange& layers) {
-  if (layers.begin >= layers.end) return {layers, {}};
-  const auto vertices = mesh.positions.span().subspan(
-      mesh.layer_vertices[layers.begin],
-      mesh.layer_vertices[layers.end] - mesh.layer_vertices[layers.begin]);
-  return {layers, {vertices.begin(), vertices.end()}};
-}
-
-Extent sum_of(const std::vector<LayerExtent>& layers) {
-  LayerExtent whole;
-  for (const LayerExtent& layer : layers) whole.add(layer);
-  return whole.extent();
-}
+// A slab, and copies of the layers on either side that others move meanwhile.
+struct MovedSlab {
+  LayerRange layers;
+  LayerRange around = {};
+  std::vector<Vec3> below = {};
+  std::vector<Vec3> above = {};
+};
 
 class Smoother {
  public:
@@ -96,154 +91,115 @@ class Smoother {
         context_(context),
         quiet_{context.stop, nullptr},
         mesh_(mesh),
-        plan_(plan_for(options, size_of({mesh.layer_vertices, mesh.layer_triangles, {}}))),
-        slabs_(cut_slabs(mesh, plan_.slabs)),
-        before_(mesh.layers()),
-        after_(mesh.layers()),
-        displacements_(mesh.layers()),
-        flat_(mesh.layers()) {
+        size_(size_of({mesh.layer_vertices, mesh.layer_triangles, {}})),
+        plan_(plan_for(options, size_)),
+        results_(mesh.layers()),
+        layers_{[this](std::ptrdiff_t layer) { return view(layer); }, results_} {
+    for (const LayerRange& layers : cut_slabs(mesh, plan_.slabs))
+      slabs_.push_back({.layers = layers});
     for (const Step& step : options.steps) shares_.push_back(static_cast<float>(step.weight));
   }
 
   SmoothingEffect run() {
     if (plan_.rounds > 1) {
       extracted_.resize_for_overwrite(mesh_.positions.size());
-      parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { keep_extracted(slabs_[i]); });
+      for_each(quiet_, mesh_.positions.size(),
+               [&](std::size_t v) { extracted_[v] = mesh_.positions[v]; });
     }
     for (std::size_t round = 0; round < plan_.rounds; ++round) run_round(round);
-    return summary();
+    return layers_.effect(mesh_.positions.size());
   }
 
  private:
-  void keep_extracted(const LayerRange& slab) {
-    const Vec3* from = mesh_.positions.data();
-    std::copy(from + mesh_.layer_vertices[slab.begin], from + mesh_.layer_vertices[slab.end],
-              extracted_.data() + mesh_.layer_vertices[slab.begin]);
+  LayerView view(std::ptrdiff_t layer) const {
+    const auto index = static_cast<std::size_t>(layer);
+    const std::uint64_t first = mesh_.layer_vertices[index];
+    return {&mesh_, index, mesh_.positions.data() + first,
+            plan_.rounds > 1 ? extracted_.data() + first : nullptr};
+  }
+
+  // The same from a slab, which has copies of others' layers.
+  LayerView view(std::ptrdiff_t layer, MovedSlab& slab) const {
+    LayerView result = view(layer);
+    if (slab.layers.contains(layer)) return result;
+    const bool is_below = layer < slab.layers.begin;
+    const std::ptrdiff_t first = is_below ? slab.around.begin : slab.layers.end;
+    result.positions = (is_below ? slab.below : slab.above).data() +
+                       (result.first() - mesh_.layer_vertices[static_cast<std::size_t>(first)]);
+    return result;
+  }
+
+  std::vector<Vec3> copy_of(std::ptrdiff_t begin, std::ptrdiff_t end) const {
+    const Vec3* positions = mesh_.positions.data();
+    return {positions + mesh_.layer_vertices[static_cast<std::size_t>(begin)],
+            positions + mesh_.layer_vertices[static_cast<std::size_t>(end)]};
   }
 
   void run_round(std::size_t number) {
     const std::size_t first = plan_.first_step(number, shares_.size());
     const std::size_t last = plan_.first_step(number + 1, shares_.size());
-    const bool is_last = number + 1 == plan_.rounds;
-    const Round round = {.mesh = mesh_,
-                         .shares = std::span(shares_).subspan(first, last - first),
+    const Round round = {.shares = std::span(shares_).subspan(first, last - first),
                          .at_curves = options_.at_curves,
                          .max_displacement_mm = options_.max_displacement_mm,
                          .within = options_.within,
-                         .extracted = plan_.rounds > 1 ? extracted_.data() : nullptr,
-                         .before = number == 0 ? before_.data() : nullptr,
-                         .after = is_last ? after_.data() : nullptr,
-                         .displacements = displacements_.data(),
-                         .flat = flat_.data()};
+                         .largest_layer = size_.largest_layer,
+                         .is_first = number == 0,
+                         .is_last = number + 1 == plan_.rounds};
+    const auto halo = static_cast<std::ptrdiff_t>(round.steps());
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
+      MovedSlab& slab = slabs_[i];
+      slab.around = {std::max<std::ptrdiff_t>(0, slab.layers.begin - halo),
+                     std::min(layers_.count(), slab.layers.end + halo)};
+      slab.below = copy_of(slab.around.begin, slab.layers.begin);
+      slab.above = copy_of(slab.layers.end, slab.around.end);
+      if (round.is_first) measure_seam(slab, &SmoothedLayer::before);
+    });
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { move(round, slabs_[i]); });
+    if (!round.is_last) return;
+    parallel_for(quiet_, slabs_.size(),
+                 [&](std::size_t i) { measure_seam(slabs_[i], &SmoothedLayer::after); });
+    restore_at_seams();
+    measure_moved(&SmoothedLayer::was_put_back);
+    for (std::ptrdiff_t layer = 0; layer < layers_.count(); ++layer) nudge_flat(layer, layers_);
+    measure_moved(&SmoothedLayer::was_nudged);
+  }
 
-    std::vector<LayerCopy> below(slabs_.size());
-    std::vector<LayerCopy> above(slabs_.size());
-    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
-      const LayerRange all = with_halo(round, slabs_[i], round.steps());
-      below[i] = copy_of(mesh_, {all.begin, slabs_[i].begin});
-      above[i] = copy_of(mesh_, {slabs_[i].end, all.end});
-      if (number == 0) measure_seam(i, before_);
-    });
-    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
-      sweep(round, slabs_[i], below[i], above[i], [&] { report_layer(); });
-    });
-    if (!is_last) return;
-    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { measure_seam(i, after_); });
-    restore_at_seams(below, above);
-    measure_moved();
-    nudge_flat();
-    measure_moved();
+  void move(const Round& round, MovedSlab& slab) {
+    const auto seen = [&](std::ptrdiff_t layer) { return view(layer, slab); };
+    LayerSteps steps(round, slab.layers, {seen, results_});
+    for (std::ptrdiff_t layer = slab.around.begin; layer < slab.around.end; ++layer) {
+      steps.go_on(layer + 1);
+      if (slab.layers.contains(layer)) report_layer();
+    }
   }
 
   // Measures the triangles that name vertices of this slab and of the next.
-  void measure_seam(std::size_t slab, std::vector<LayerExtent>& extents) {
-    const auto layer = static_cast<std::size_t>(slabs_[slab].end) - 1;
-    if (layer + 1 < mesh_.layers()) add_triangles(mesh_, layer, extents[layer]);
+  void measure_seam(const MovedSlab& slab, LayerExtent SmoothedLayer::*extent) {
+    const std::ptrdiff_t layer = slab.layers.end - 1;
+    if (layer + 1 == layers_.count()) return;
+    layers_.add_triangles(layer, layers_.result(layer).*extent);
   }
 
-  // Puts back the vertices that sweeps leave listed, and those of seams' triangles without area.
-  void restore_at_seams(const std::vector<LayerCopy>& below, const std::vector<LayerCopy>& above) {
+  // Puts back the vertices that steps leave listed, and those of seams' triangles without area.
+  void restore_at_seams() {
     for (std::size_t i = 0; i + 1 < slabs_.size(); ++i) {
-      const auto layer = static_cast<std::size_t>(slabs_[i].end) - 1;
-      if (after_[layer].has_flat()) list_flat(mesh_, layer, flat_.data());
+      const std::ptrdiff_t layer = slabs_[i].layers.end - 1;
+      if (layers_.result(layer).after.has_flat()) list_flat(layer, layers_);
     }
-    const auto restore = [&](std::ptrdiff_t layer, const LayerCopy& copy) {
-      const auto index = static_cast<std::size_t>(layer);
-      const Vec3* extracted = plan_.rounds > 1 ? extracted_.data() + mesh_.layer_vertices[index]
-                                               : copy.layer(mesh_, layer);
-      put_back(extracted, index, mesh_, flat_[index], displacements_[index]);
+    const auto restore = [&](std::ptrdiff_t layer, MovedSlab& beside) {
+      const LayerView before = view(layer, beside);
+      put_back(before.extracted != nullptr ? before.extracted : before.positions, layer, layers_);
     };
     for (std::size_t i = 0; i + 1 < slabs_.size(); ++i) {
-      restore(slabs_[i].end - 1, below[i + 1]);
-      restore(slabs_[i].end, above[i]);
+      restore(slabs_[i].layers.end - 1, slabs_[i + 1]);
+      restore(slabs_[i].layers.end, slabs_[i]);
     }
   }
 
-  // Measures again what vertices name that were moved after their layer was measured.
-  void measure_moved() {
+  void measure_moved(bool SmoothedLayer::*was_moved) {
     parallel_for(quiet_, mesh_.layers(), [&](std::size_t layer) {
-      const bool is_last = layer + 1 == mesh_.layers();
-      if (!flat_[layer].were_moved && (is_last || !flat_[layer + 1].were_moved)) return;
-      after_[layer] = {};
-      for (auto v = mesh_.layer_vertices[layer]; v < mesh_.layer_vertices[layer + 1]; ++v) {
-        after_[layer].add_vertex(load(mesh_.positions[v]));
-      }
-      add_triangles(mesh_, layer, after_[layer]);
+      measure_again(static_cast<std::ptrdiff_t>(layer), was_moved, layers_);
     });
-    for (FlatVertices& flat : flat_) flat.were_moved = false;
-  }
-
-  // Beside slivers, which samples that equal the iso-value have around them, one corner that is put
-  // back can come to lie in line with two others that are not.
-  void nudge_flat() {
-    for (std::size_t layer = 0; layer < mesh_.layers(); ++layer) {
-      if (!after_[layer].has_flat()) continue;
-      for (const Triangle& triangle : mesh_.triangles_of(layer, layer + 1)) {
-        if (!has_no_area(mesh_, triangle)) continue;
-        for (const std::uint32_t vertex : triangle) {
-          const std::size_t of_vertex =
-              vertex < mesh_.layer_vertices[layer + 1] ? layer : layer + 1;
-          if (!nudge(vertex, of_vertex)) continue;
-          flat_[of_vertex].were_moved = true;
-          break;
-        }
-      }
-    }
-  }
-
-  // Moves the vertex by about the rounding of its position, such that its triangles have areas.
-  // Returns false if there is no such move, or if the vertex is not free.
-  bool nudge(std::uint32_t vertex, std::size_t layer) {
-    std::vector<Triangle> around;
-    std::int64_t next_minus_previous = 0;  // not 0 on the boundary of a manifold
-    for (const Triangle& triangle :
-         mesh_.triangles_of(layer - std::min<std::size_t>(layer, 1), layer + 1)) {
-      const std::size_t corner = std::ranges::find(triangle, vertex) - triangle.begin();
-      if (corner == triangle.size()) continue;
-      around.push_back(triangle);
-      next_minus_previous += std::int64_t{triangle[(corner + 1) % 3]} - triangle[(corner + 2) % 3];
-    }
-    if (next_minus_previous != 0 || mesh_.is_on_border(vertex) || mesh_.is_on_line(vertex)) {
-      return false;
-    }
-    float largest = 0;
-    for (const Triangle& triangle : around) {
-      for (const std::uint32_t corner : triangle) {
-        for (const float at : mesh_.positions[corner]) largest = std::max(largest, std::abs(at));
-      }
-    }
-    const Vec3 position = mesh_.positions[vertex];
-    for (const float step : {largest * 0x1p-22F, -largest * 0x1p-22F}) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        mesh_.positions[vertex][axis] = position[axis] + step;
-        if (std::ranges::none_of(around,
-                                 [&](const Triangle& t) { return has_no_area(mesh_, t); })) {
-          return true;
-        }
-        mesh_.positions[vertex] = position;
-      }
-    }
-    return false;
   }
 
   void report_layer() {
@@ -254,30 +210,17 @@ class Smoother {
                       static_cast<double>(plan_.rounds * mesh_.layers()));
   }
 
-  SmoothingEffect summary() const {
-    SmoothingEffect result = {.before = sum_of(before_), .after = sum_of(after_)};
-    for (const LayerDisplacement& layer : displacements_) {
-      result.mean_displacement_mm += layer.sum;
-      result.max_displacement_mm = std::max(result.max_displacement_mm, layer.largest);
-    }
-    if (mesh_.positions.size() > 0) {
-      result.mean_displacement_mm /= static_cast<double>(mesh_.positions.size());
-    }
-    return result;
-  }
-
   const SmoothOptions& options_;
   const Context& context_;
   const Context quiet_;
   Mesh& mesh_;
+  const SurfaceSize size_;
   const Plan plan_;
-  const std::vector<LayerRange> slabs_;
+  std::vector<MovedSlab> slabs_;
   std::vector<float> shares_;
   Buffer<Vec3> extracted_;  // only for several rounds
-  std::vector<LayerExtent> before_;
-  std::vector<LayerExtent> after_;
-  std::vector<LayerDisplacement> displacements_;
-  std::vector<FlatVertices> flat_;
+  std::vector<SmoothedLayer> results_;
+  const SmoothedLayers layers_;
   std::atomic<std::size_t> layers_done_ = 0;
 };
 

@@ -12,7 +12,7 @@
 #include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/measure/surface_view.h"
 #include "server/mesh/parallel.h"
-#include "server/mesh/smooth/sweep.h"
+#include "server/mesh/smooth/layer_steps.h"
 
 namespace isomesh::mesh {
 namespace {

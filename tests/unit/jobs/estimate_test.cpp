@@ -46,20 +46,18 @@ class EstimateTest : public test::JobsFixture {
 
 // A job that is rejected too late is tried forever.
 TEST(CheckDisk, RejectsFilesThatCanNeverFit) {
-  mesh::Mesh mesh;
-  mesh.positions.resize_for_overwrite(500'000);
-  mesh.triangles.resize_for_overwrite(1'000'000);
+  const mesh::SurfaceSize surface = {.triangles = 1'000'000, .vertices = 500'000};
   const Volume volume;
   MeshParameters parameters;
   const auto code_of = [&](MeshFormat format, std::uint64_t disk_bytes) {
     parameters.formats = {format};
     return test::code_thrown_by([&] {
-      check_disk(mesh, {.volume = volume,
-                        .parameters = parameters,
-                        .iso = 0,
-                        .certify = false,
-                        .memory_bytes = 0,
-                        .disk_bytes = disk_bytes});
+      check_disk(surface, {.volume = volume,
+                           .parameters = parameters,
+                           .iso = 0,
+                           .certify = false,
+                           .memory_bytes = 0,
+                           .disk_bytes = disk_bytes});
     });
   };
   using Case = std::pair<MeshFormat, std::uint64_t>;

@@ -26,6 +26,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/mesh/measure", {"server/mesh/topology"}},
     {"server/mesh/smooth", {"server/mesh/extract", "server/mesh/measure"}},
     {"server/mesh/labels", {"server/mesh/extract", "server/mesh/measure"}},
+    {"server/mesh/walk", {"server/mesh/extract", "server/mesh/smooth"}},
     {"server/mesh/stairs", {"server/mesh/labels", "server/mesh/smooth"}},
     {"server/mesh/collapse", {"server/mesh/labels"}},
     {"server/volume", {"proto"}},

@@ -1,4 +1,4 @@
-#include "server/mesh/smooth/sweep.h"
+#include "server/mesh/smooth/layer_steps.h"
 
 #include <algorithm>
 #include <array>
@@ -9,6 +9,7 @@
 
 #include "server/mesh/buffer.h"
 #include "server/mesh/points.h"
+#include "server/mesh/smooth/flat_triangles.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -145,54 +146,65 @@ Float4 pulled_back(const Vec3& origin, Float4 position, double limit) {
   return position;
 }
 
-class Sweep {
+}  // namespace
+
+class LayerSteps::Sweep {
  public:
-  Sweep(const Round& round, const LayerRange& slab, const LayerCopy& below, const LayerCopy& above,
-        const std::function<void()>& on_layer)
+  Sweep(const Round& round, const LayerRange& slab, SmoothedLayers layers)
       : round_(round),
         slab_(slab),
-        below_(below),
-        above_(above),
-        on_layer_(on_layer),
-        steps_(round.steps()) {
-    const LayerRange all = covered(0);
-    for (std::ptrdiff_t layer = all.begin; layer < all.end; ++layer) {
-      width_ = std::max(width_, vertices(layer));
-    }
-    for (std::size_t step = 0; step < steps_; ++step) {
+        layers_(std::move(layers)),
+        steps_(round.steps()),
+        width_(round.largest_layer),
+        front_(covered(0).begin) {
+    for (std::size_t step = 0; step < std::max<std::size_t>(1, steps_); ++step) {
       rings_.emplace_back().resize_for_overwrite(kRingLayers * width_ + 1);
       rings_.back()[kRingLayers * width_] = Float4{};  // for places of no neighbour
     }
     moved_.resize_for_overwrite(width_);
-    if (round_.after != nullptr) kept_.resize_for_overwrite(kLayersOfTriangles * width_);
+    if (round_.is_last) kept_.resize_for_overwrite(kLayersOfTriangles * width_);
     links_.resize((steps_ + 1) * width_, Neighbors(place_of_zero()));
     fans_.resize(kLayersOfFans * width_);
     more_.resize(steps_ + 1);
     on_line_.resize(steps_ + 1);
   }
 
-  void run() {
-    const std::ptrdiff_t bottom = covered(0).begin;
+  // The layers that a step moves. Those of step 0 are the ones that the first step reads.
+  LayerRange covered(std::size_t step) const {
+    const auto halo = static_cast<std::ptrdiff_t>(steps_ - step);
+    return {std::max<std::ptrdiff_t>(0, slab_.begin - halo),
+            std::min(layers_.count(), slab_.end + halo)};
+  }
+
+  void go_on(std::ptrdiff_t available) {
+    const LayerRange all = covered(0);
+    if (available <= all.begin) return;
+    if (!has_begun_) {
+      read(all.begin);
+      begin_links(all.begin);
+      has_begun_ = true;
+    }
     const auto last_step = static_cast<std::ptrdiff_t>(steps_);
-    read(bottom);
-    begin_links(bottom);
-    for (std::ptrdiff_t front = bottom; front < slab_.end + last_step - 1; ++front) {
-      read(front + 1);
-      link(front);
+    const std::ptrdiff_t end = available >= all.end
+                                   ? slab_.end + std::max<std::ptrdiff_t>(0, last_step - 1)
+                                   : available - 1;
+    for (; front_ < end; ++front_) {
+      read(front_ + 1);
+      link(front_);
       for (std::ptrdiff_t step = 1; step <= last_step; ++step) {
-        const std::ptrdiff_t layer = front - (step - 1);
-        advance(static_cast<std::size_t>(step), layer);
+        advance(static_cast<std::size_t>(step), front_ - (step - 1));
       }
     }
   }
 
- private:
-  // The layers that a step moves. Those of step 0 are the ones that the first step reads.
-  LayerRange covered(std::size_t step) const { return with_halo(round_, slab_, steps_ - step); }
-
-  std::size_t vertices(std::ptrdiff_t layer) const {
-    return round_.first_vertex(layer + 1) - round_.first_vertex(layer);
+  std::ptrdiff_t moved() const {
+    const std::ptrdiff_t behind =
+        std::max<std::ptrdiff_t>(0, static_cast<std::ptrdiff_t>(steps_) - 1);
+    return std::clamp(front_ - behind, slab_.begin, slab_.end);
   }
+
+ private:
+  LayerView view(std::ptrdiff_t layer) const { return layers_.view(layer); }
 
   static std::size_t turn(std::ptrdiff_t layer, std::size_t period) {
     return static_cast<std::size_t>(layer) % period;
@@ -210,9 +222,10 @@ class Sweep {
   std::vector<MoreNeighbor>& more_neighbors(std::ptrdiff_t layer) {
     return more_[turn(layer, steps_ + 1)];
   }
-  LayerLinks layer_links(std::ptrdiff_t layer) {
+  // `first`: the number of the layer's first vertex in the triangles that are listed.
+  LayerLinks layer_links(std::ptrdiff_t layer, std::uint64_t first) {
     return {
-        .first = static_cast<std::uint32_t>(round_.first_vertex(layer)),
+        .first = static_cast<std::uint32_t>(first),
         .first_place = static_cast<Place>(turn(layer, kRingLayers) * width_ * kPlacesPerPosition),
         .neighbors = links(layer),
         .fans = fans(layer),
@@ -223,58 +236,50 @@ class Sweep {
     return static_cast<Place>(kRingLayers * width_ * kPlacesPerPosition);
   }
 
-  // The layer's positions before the round; valid for the slab's own layers until their last step.
-  const Vec3* unmoved(std::ptrdiff_t layer) const {
-    if (slab_.contains(layer)) return round_.mesh.positions.data() + round_.first_vertex(layer);
-    return (layer < slab_.begin ? below_ : above_).layer(round_.mesh, layer);
-  }
-
-  const Vec3* extracted(std::ptrdiff_t layer) const {
-    return round_.extracted != nullptr ? round_.extracted + round_.first_vertex(layer)
-                                       : unmoved(layer);
-  }
-
   void read(std::ptrdiff_t layer) {
     if (!covered(0).contains(layer)) return;
-    const Vec3* from = unmoved(layer);
+    const LayerView from = view(layer);
     Float4* to = positions(0, layer);
-    const std::size_t count = vertices(layer);
-    for (std::size_t v = 0; v < count; ++v) {
-      to[v] = Float4{from[v][0], from[v][1], from[v][2], 0};
-    }
-    if (round_.before == nullptr || !slab_.contains(layer)) return;
-    for (std::size_t v = 0; v < count; ++v) round_.before[layer].add_vertex(to[v]);
-    measure(layer, round_.before);
+    const std::size_t count = from.vertices();
+    for (std::size_t v = 0; v < count; ++v) to[v] = load(from.positions[v]);
+    if (!round_.is_first || !slab_.contains(layer)) return;
+    LayerExtent& before = layers_.result(layer).before;
+    for (std::size_t v = 0; v < count; ++v) before.add_vertex(to[v]);
+    measure(layer, &SmoothedLayer::before);
   }
 
   // Measures the triangles of the slab that are complete once the layer is.
-  void measure(std::ptrdiff_t layer, LayerExtent* extents) {
-    if (slab_.contains(layer - 1)) add_triangles(round_.mesh, layer - 1, extents[layer - 1]);
-    if (layer + 1 == round_.layers()) add_triangles(round_.mesh, layer, extents[layer]);
+  void measure(std::ptrdiff_t layer, LayerExtent SmoothedLayer::*extent) {
+    const auto add = [&](std::ptrdiff_t of) {
+      layers_.add_triangles(of, layers_.result(of).*extent);
+    };
+    if (slab_.contains(layer - 1)) add(layer - 1);
+    if (layer + 1 == layers_.count()) add(layer);
   }
 
   void begin_links(std::ptrdiff_t layer) {
-    std::fill_n(links(layer), vertices(layer), Neighbors(place_of_zero()));
-    std::fill_n(fans(layer), vertices(layer), Fan());
+    const std::size_t count = view(layer).vertices();
+    std::fill_n(links(layer), count, Neighbors(place_of_zero()));
+    std::fill_n(fans(layer), count, Fan());
     more_neighbors(layer).clear();
     on_line_[turn(layer, steps_ + 1)].clear();
   }
 
   // Adds the layer's triangles to the neighbours of its vertices, which completes them.
   void link(std::ptrdiff_t layer) {
-    if (layer >= covered(1).end) return;
-    const bool is_last = layer + 1 == round_.layers();
-    LayerLinks upper = {.first = static_cast<std::uint32_t>(round_.first_vertex(layer + 1))};
-    if (!is_last) {
+    if (steps_ == 0 || layer >= covered(1).end) return;
+    const LayerView own = view(layer);
+    LayerLinks upper = {.first = static_cast<std::uint32_t>(own.end())};
+    if (layer + 1 < layers_.count()) {
       begin_links(layer + 1);
-      upper = layer_links(layer + 1);
+      upper = layer_links(layer + 1, own.end());
     }
-    const auto triangles = round_.mesh.triangles_of(layer, layer + 1);
-    const auto is_on_line = [&](std::uint32_t v) { return round_.mesh.is_on_line(v); };
-    if (round_.mesh.on_line.empty()) {
-      add_neighbors<false>(triangles, layer_links(layer), upper, is_on_line);
+    const LayerLinks lower = layer_links(layer, own.first());
+    const auto is_on_line = [&](std::uint32_t v) { return own.mesh->is_on_line(v); };
+    if (own.mesh->on_line.empty()) {
+      add_neighbors<false>(own.triangles(), lower, upper, is_on_line);
     } else {
-      add_neighbors<true>(triangles, layer_links(layer), upper, is_on_line);
+      add_neighbors<true>(own.triangles(), lower, upper, is_on_line);
     }
     weigh(layer);
     auto& more = more_neighbors(layer);
@@ -287,6 +292,7 @@ class Sweep {
   // along it; two name one across a wall.
   void free_along_lines(std::ptrdiff_t layer) {
     auto& found = on_line_[turn(layer, steps_ + 1)];
+    const LayerView own = view(layer);
     const auto key = [](const MoreNeighbor& n) { return std::pair(n.vertex, n.place); };
     std::ranges::sort(found, {}, key);
     for (std::size_t i = 0; i < found.size();) {
@@ -300,24 +306,21 @@ class Sweep {
         if (count < along.size()) along[count] = found[begin].place;
         ++count;
       }
-      if (count != along.size() || is_on_border(layer, vertex)) continue;
+      if (count != along.size() || own.mesh->is_on_border(own.first() + vertex)) continue;
       Neighbors& link = links(layer)[vertex];
       std::ranges::copy(along, link.places.begin());
       link.weight = 1.0F / along.size();
     }
   }
 
-  bool is_on_border(std::ptrdiff_t layer, std::size_t vertex) const {
-    return round_.mesh.is_on_border(round_.first_vertex(layer) + vertex);
-  }
-
   // Sets the weights of the layer's neighbours. Vertices on a junction curve have an empty fan.
   void weigh(std::ptrdiff_t layer) {
     Neighbors* link = links(layer);
     const Fan* fan = fans(layer);
-    const std::size_t count = vertices(layer);
+    const LayerView own = view(layer);
+    const std::size_t count = own.vertices();
     for (std::size_t v = 0; v < count; ++v) {
-      const bool is_fixed = fan[v].is_on_boundary() || is_on_border(layer, v);
+      const bool is_fixed = fan[v].is_on_boundary() || own.mesh->is_on_border(own.first() + v);
       link[v].weight = is_fixed ? 0 : fan[v].one_over_count();
     }
     if (round_.at_curves == AtCurves::kAlong) free_along_lines(layer);
@@ -332,7 +335,6 @@ class Sweep {
     if (std::isfinite(round_.max_displacement_mm)) pull_back(layer, to);
     if (!is_last) return;
     finish(layer);
-    on_layer_();
   }
 
   void move(std::size_t step, std::ptrdiff_t layer, Float4* to) {
@@ -341,7 +343,7 @@ class Sweep {
     const MoreNeighbor* more = more_neighbors(layer).data();
     const Float4* ring = rings_[step - 1].data();
     const Float4* from = positions(step - 1, layer);
-    const std::size_t count = vertices(layer);
+    const std::size_t count = view(layer).vertices();
     for (std::size_t v = 0; v < count; ++v) {
       Float4 sum = {};
       for (const Place place : link[v].places) sum += at(ring, place);
@@ -354,7 +356,7 @@ class Sweep {
 
   void hold_within(std::ptrdiff_t layer, Float4* to) {
     const Neighbors* link = links(layer);
-    const std::size_t count = vertices(layer);
+    const std::size_t count = view(layer).vertices();
     for (std::size_t v = 0; v < count; ++v) {
       if (link[v].weight == 0) continue;
       for (const HalfSpace& half : round_.within) {
@@ -368,11 +370,16 @@ class Sweep {
     }
   }
 
+  static const Vec3* extracted(const LayerView& layer) {
+    return layer.extracted != nullptr ? layer.extracted : layer.positions;
+  }
+
   void pull_back(std::ptrdiff_t layer, Float4* to) const {
     const double limit = round_.max_displacement_mm;
     const auto surely_within = static_cast<float>(limit * 0.999);
-    const Vec3* origin = extracted(layer);
-    const std::size_t count = vertices(layer);
+    const LayerView own = view(layer);
+    const Vec3* origin = extracted(own);
+    const std::size_t count = own.vertices();
     for (std::size_t v = 0; v < count; ++v) {
       const Float4 from = {origin[v][0], origin[v][1], origin[v][2], 0};
       if (length_of(to[v] - from) > surely_within) to[v] = pulled_back(origin[v], to[v], limit);
@@ -381,45 +388,45 @@ class Sweep {
 
   // Writes the layer's positions after the round, and measures them in the last round.
   void finish(std::ptrdiff_t layer) {
-    const std::size_t count = vertices(layer);
-    const Vec3* origin = extracted(layer);  // may be `to`: read before written
-    Vec3* to = round_.mesh.positions.data() + round_.first_vertex(layer);
+    const LayerView own = view(layer);
+    const std::size_t count = own.vertices();
+    const Vec3* origin = extracted(own);  // may be `to`: read before written
+    Vec3* to = own.positions;
     LayerDisplacement displacement;
-    LayerExtent* extent = round_.after == nullptr ? nullptr : &round_.after[layer];
-    if (extent != nullptr) std::copy_n(origin, count, kept(layer));
+    SmoothedLayer* result = round_.is_last ? &layers_.result(layer) : nullptr;
+    if (result != nullptr) std::copy_n(origin, count, kept(layer));
     for (std::size_t v = 0; v < count; ++v) {
       const Float4 moved = moved_[v];
       const Vec3 position = {moved[0], moved[1], moved[2]};
-      if (extent != nullptr) {
-        extent->add_vertex(moved);
+      if (result != nullptr) {
+        result->after.add_vertex(moved);
         displacement.add(origin[v], position);
       }
       to[v] = position;
     }
-    if (extent == nullptr) return;
-    round_.displacements[layer] = displacement;
-    measure(layer, round_.after);
+    if (result == nullptr) return;
+    result->displacement = displacement;
+    measure(layer, &SmoothedLayer::after);
     if (slab_.contains(layer - 1)) restore(layer - 1);
-    if (layer + 1 == round_.layers()) restore(layer);
+    if (layer + 1 == layers_.count()) restore(layer);
   }
 
   // Undoes the moves that left triangles without area, once all triangles of the layer are known.
   void restore(std::ptrdiff_t layer) {
-    const auto index = static_cast<std::size_t>(layer);
-    if (round_.after[index].has_flat()) list_flat(round_.mesh, index, round_.flat);
+    if (layers_.result(layer).after.has_flat()) list_flat(layer, layers_);
     const bool is_first = layer == slab_.begin && layer > 0;
-    const bool is_last = layer + 1 == slab_.end && slab_.end < round_.layers();
+    const bool is_last = layer + 1 == slab_.end && slab_.end < layers_.count();
     if (is_first || is_last) return;  // another slab's triangles name its vertices, too
-    put_back(kept(layer), index, round_.mesh, round_.flat[index], round_.displacements[index]);
+    put_back(kept(layer), layer, layers_);
   }
 
-  const Round& round_;
+  const Round round_;
   const LayerRange slab_;
-  const LayerCopy& below_;
-  const LayerCopy& above_;
-  const std::function<void()>& on_layer_;
+  const SmoothedLayers layers_;
   const std::size_t steps_;
-  std::size_t width_ = 0;              // the vertices of the largest layer
+  const std::size_t width_;  // the vertices of the largest layer
+  std::ptrdiff_t front_;     // the layer whose links come next
+  bool has_begun_ = false;
   std::vector<Buffer<Float4>> rings_;  // positions before each step
   Buffer<Float4> moved_;               // the positions of one layer after the last step
   Buffer<Vec3> kept_;                  // extracted positions of layers that have been overwritten
@@ -429,7 +436,12 @@ class Sweep {
   std::vector<std::vector<MoreNeighbor>> on_line_;
 };
 
-}  // namespace
+LayerSteps::LayerSteps(const Round& round, const LayerRange& slab, SmoothedLayers layers)
+    : sweep_(std::make_unique<Sweep>(round, slab, std::move(layers))) {}
+LayerSteps::~LayerSteps() = default;
+
+void LayerSteps::go_on(std::ptrdiff_t available) { sweep_->go_on(available); }
+std::ptrdiff_t LayerSteps::moved() const { return sweep_->moved(); }
 
 void LayerDisplacement::add(const Vec3& extracted, const Vec3& moved) {
   const Point way = minus(to_point(moved), to_point(extracted));
@@ -438,42 +450,33 @@ void LayerDisplacement::add(const Vec3& extracted, const Vec3& moved) {
   largest = std::max(largest, length);
 }
 
-void list_flat(const Mesh& mesh, std::size_t layer, FlatVertices* flat) {
-  for (const Triangle& triangle : mesh.triangles_of(layer, layer + 1)) {
-    if (!has_no_area(mesh, triangle)) continue;
-    for (const std::uint32_t vertex : triangle) {
-      const bool is_next = vertex >= mesh.layer_vertices[layer + 1];
-      flat[is_next ? layer + 1 : layer].vertices.push_back(vertex);
-    }
+void SmoothedLayers::add_triangles(std::ptrdiff_t layer, LayerExtent& extent) const {
+  const LayerView low = view(layer);
+  const LayerView high = layer + 1 < count() ? view(layer + 1) : LayerView();
+  const std::uint64_t first = low.first();
+  const std::uint64_t split = low.end();
+  extent.add_triangles(low.triangles(), low.mesh->origin, [&](std::uint32_t v) {
+    return load(v < split ? low.positions[v - first] : high.positions[v - split]);
+  });
+}
+
+SmoothingEffect SmoothedLayers::effect(std::uint64_t vertices) const {
+  LayerExtent before;
+  LayerExtent after;
+  SmoothingEffect effect;
+  for (const SmoothedLayer& layer : results) {
+    before.add(layer.before);
+    after.add(layer.after);
+    effect.mean_displacement_mm += layer.displacement.sum;
+    effect.max_displacement_mm = std::max(effect.max_displacement_mm, layer.displacement.largest);
   }
+  effect.before = before.extent();
+  effect.after = after.extent();
+  if (vertices > 0) effect.mean_displacement_mm /= static_cast<double>(vertices);
+  return effect;
 }
 
-void put_back(const Vec3* extracted, std::size_t layer, Mesh& mesh, FlatVertices& flat,
-              LayerDisplacement& displacement) {
-  if (flat.vertices.empty()) return;
-  const std::uint64_t first = mesh.layer_vertices[layer];
-  for (const std::uint32_t vertex : flat.vertices) {
-    mesh.positions[vertex] = extracted[vertex - first];
-  }
-  flat = {.vertices = {}, .were_moved = true};
-  displacement = {};
-  for (std::uint64_t vertex = first; vertex < mesh.layer_vertices[layer + 1]; ++vertex) {
-    displacement.add(extracted[vertex - first], mesh.positions[vertex]);
-  }
-}
-
-LayerRange with_halo(const Round& round, const LayerRange& slab, std::size_t steps) {
-  const auto halo = static_cast<std::ptrdiff_t>(steps);
-  return {std::max<std::ptrdiff_t>(0, slab.begin - halo),
-          std::min(round.layers(), slab.end + halo)};
-}
-
-void sweep(const Round& round, const LayerRange& slab, const LayerCopy& below,
-           const LayerCopy& above, const std::function<void()>& on_layer) {
-  Sweep(round, slab, below, above, on_layer).run();
-}
-
-std::uint64_t sweep_bytes_per_vertex(std::size_t steps) {
+std::uint64_t step_bytes_per_vertex(std::size_t steps) {
   return (kRingLayers * steps + 1) * sizeof(Float4) + (steps + 1) * sizeof(Neighbors) +
          kLayersOfFans * sizeof(Fan) + kLayersOfTriangles * sizeof(Vec3);
 }

@@ -1,0 +1,53 @@
+// Extraction of a surface in windows, runs of its layers, so that it need not be in memory as a
+// whole.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "server/mesh/context.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/lattice/lattice.h"
+#include "server/mesh/mesh.h"
+#include "server/mesh/spool.h"
+
+namespace isomesh::mesh {
+
+struct Extraction;
+class IndexMemory;
+class JoinedLayers;
+
+class SurfaceWindows {
+ public:
+  // Counts the surface, as count_surface does. Both must outlive it. What extraction needs of the
+  // count beside the sizes goes to the spool, if there is one. Throws as the spool, and Error
+  // kCancelled.
+  template <class T>
+  SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& options, const Context& context,
+                 Spool* spool = nullptr);
+  ~SurfaceWindows();
+
+  const SurfaceCount& count() const { return count_; }
+  std::uint32_t layers() const {
+    return static_cast<std::uint32_t>(count_.layer_vertices.size() - 1);
+  }
+
+  // Writes the layers [begin, end) of the surface as a mesh, whose memory is reused. It has one
+  // layer more, without triangles: room for the vertices of the layer behind them, which triangles
+  // name; those are left indeterminate. Vertices have the mesh's own numbers. Thread safe for
+  // different meshes. Throws as the spool.
+  void write(std::uint32_t begin, std::uint32_t end, Mesh& mesh);
+  // Frees what layers need that are not written again. Not while others near them are written.
+  void forget(std::uint32_t begin, std::uint32_t end);
+
+ private:
+  const bool close_;
+  const std::array<double, 3> origin_;
+  SurfaceCount count_;
+  std::unique_ptr<JoinedLayers> joined_;
+  std::unique_ptr<Extraction> extraction_;  // null if there is no surface
+  std::unique_ptr<IndexMemory> memory_;
+};
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,47 @@
+// Triangles that smoothing leaves without area; private to the kernels.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+
+#include "server/mesh/smooth/layer_steps.h"
+
+namespace isomesh::mesh {
+
+// Lists the corners of triangles without area between the layer and the next. The caller lists
+// those on both sides of a layer before it puts any back.
+void list_flat(std::ptrdiff_t layer, const SmoothedLayers& layers);
+
+// Puts the layer's listed vertices back, and sums the displacements anew if there are any.
+// `extracted` holds its extracted positions.
+void put_back(const Vec3* extracted, std::ptrdiff_t layer, const SmoothedLayers& layers);
+
+// Measures the layer again if vertices that its triangles name have been put back, or nudged,
+// since.
+void measure_again(std::ptrdiff_t layer, bool SmoothedLayer::*was_moved,
+                   const SmoothedLayers& layers);
+
+// Moves corners of triangles between the layer and the next that have no area still: beside
+// slivers, which samples that equal the iso-value have around them, one corner that is put back can
+// come to lie in line with two others that are not. Once for each layer, in their order, when those
+// up to the second next have been put back, and those up to the next measured again.
+void nudge_flat(std::ptrdiff_t layer, const SmoothedLayers& layers);
+
+// Does all that as the layers come, after all steps of one slab.
+class FlatTriangles {
+ public:
+  explicit FlatTriangles(SmoothedLayers layers) : layers_(std::move(layers)) {}
+
+  // As LayerSteps::moved() says.
+  void go_on(std::ptrdiff_t moved);
+  // The layers before this never move again.
+  std::ptrdiff_t ended() const { return nudged_; }
+
+ private:
+  const SmoothedLayers layers_;
+  std::ptrdiff_t measured_ = 0;
+  std::ptrdiff_t nudged_ = 0;
+  std::ptrdiff_t ended_ = 0;
+};
+
+}  // namespace isomesh::mesh

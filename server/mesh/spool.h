@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace isomesh::mesh {
+
+// Room for bytes that would take too much memory: a file without a name, or what stands in for it.
+// Thread safe.
+class Spool {
+ public:
+  virtual ~Spool() = default;
+
+  // Throws Error kOutOfSpace if there is no room.
+  virtual void write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
+  // Only what has been written.
+  virtual void read(std::uint64_t at, std::span<std::byte> bytes) const = 0;
+};
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,319 @@
+#include "server/mesh/walk/walk.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "base/mutex.h"
+#include "server/mesh/parallel.h"
+#include "server/mesh/smooth/flat_triangles.h"
+#include "server/mesh/smooth/layer_steps.h"
+
+namespace isomesh::mesh {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Deeper windows number fewer planes twice, flatter ones take less memory.
+constexpr std::uint64_t kUsualTriangles = std::uint64_t{1} << 19;  // of a window
+constexpr std::uint32_t kFewestLayers = 4;
+constexpr std::uint32_t kMostLayers = 32;
+// A vertex stays where it is when so many layers behind it have been moved by all steps.
+constexpr std::size_t kLayersUntilSettled = 4;
+
+std::uint32_t usual_depth(std::uint64_t triangles, std::uint64_t layers) {
+  const std::uint64_t deep = kUsualTriangles * layers / std::max<std::uint64_t>(1, triangles);
+  // Enough of them for all threads.
+  const std::uint64_t shared = layers / (4 * static_cast<std::uint64_t>(thread_count()));
+  return static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>(std::min(deep, shared), kFewestLayers, kMostLayers));
+}
+
+// The windows in memory: one that is used, those that hold its layers up, and one for each thread.
+std::size_t windows_at_once(std::size_t steps, std::uint32_t depth) {
+  return 1 + (steps + kLayersUntilSettled + depth - 1) / depth +
+         static_cast<std::size_t>(thread_count());
+}
+
+class Walk {
+ public:
+  Walk(SurfaceWindows& surface, const SmoothOptions& options, const Context& context,
+       WindowUser& user, std::uint32_t depth)
+      : surface_(surface),
+        context_(context),
+        user_(user),
+        threads_(static_cast<std::size_t>(thread_count())),
+        depth_(depth),
+        count_((surface.layers() + depth - 1) / depth),
+        slots_(std::min(count_, windows_at_once(options.steps.size(), depth))),
+        results_(surface.layers()),
+        layers_{[this](std::ptrdiff_t layer) { return view(layer); }, results_},
+        flat_(layers_),
+        written_(count_, false) {
+    for (const Step& step : options.steps) shares_.push_back(static_cast<float>(step.weight));
+    const Round round = {.shares = shares_,
+                         .at_curves = options.at_curves,
+                         .max_displacement_mm = options.max_displacement_mm,
+                         .within = options.within,
+                         .largest_layer = size_of(surface.count()).largest_layer,
+                         .is_last = !shares_.empty()};
+    steps_.emplace(round, LayerRange{0, layers_.count()}, layers_);
+    make_room();
+  }
+
+  WalkEnd run() {
+    // Tasks run on one thread each: a loop within one would take over others of these.
+    parallel_for({context_.stop, nullptr}, threads_, [&](std::size_t /*thread*/) {
+      const OneThread alone;
+      work();
+    });
+    const Lock lock(mutex_);
+    SmoothingEffect effect = layers_.effect(surface_.count().vertices());
+    if (shares_.empty()) effect.after = effect.before;
+    return {effect, seconds_};
+  }
+
+ private:
+  enum class Kind { kWrite, kSmooth, kUse, kEnd };
+  struct Task {
+    Kind kind;
+    std::size_t window;
+    std::size_t part;
+    WindowUser::InOrder end;
+  };
+
+  std::uint32_t begin_of(std::size_t window) const {
+    return static_cast<std::uint32_t>(window) * depth_;
+  }
+  std::uint32_t end_of(std::size_t window) const {
+    return std::min(surface_.layers(), begin_of(window) + depth_);
+  }
+  Window& at(std::size_t window) { return slots_[window % slots_.size()]; }
+
+  LayerView view(std::ptrdiff_t layer) {
+    const auto index = static_cast<std::size_t>(layer);
+    Mesh& mesh = at(index / depth_).mesh;
+    const std::size_t own = index % depth_;
+    return {&mesh, own, mesh.positions.data() + mesh.layer_vertices[own]};
+  }
+
+  // As much as the largest window needs: arrays that grew would leave holes.
+  void make_room() {
+    const SurfaceCount& count = surface_.count();
+    std::uint64_t vertices = 0;
+    std::uint64_t triangles = 0;
+    for (std::size_t w = 0; w < count_; ++w) {
+      const std::uint32_t behind = std::min(surface_.layers(), end_of(w) + 1);
+      vertices =
+          std::max(vertices, count.layer_vertices[behind] - count.layer_vertices[begin_of(w)]);
+      triangles = std::max(triangles,
+                           count.layer_triangles[end_of(w)] - count.layer_triangles[begin_of(w)]);
+    }
+    for (Window& slot : slots_) {
+      slot.mesh.positions.resize_for_overwrite(vertices);
+      slot.mesh.triangles.resize_for_overwrite(triangles);
+    }
+  }
+
+  void work() {
+    for (;;) {
+      Lock lock(mutex_);
+      std::optional<Task> task;
+      while (used_ < count_ && !has_failed_ && !(task = take())) changed_.wait(lock);
+      if (!task) return;
+      lock.unlock();
+      const Clock::time_point began = Clock::now();
+      try {
+        context_.throw_if_stopped();
+        run(*task);
+      } catch (...) {
+        lock.lock();
+        has_failed_ = true;
+        changed_.notify_all();
+        throw;
+      }
+      lock.lock();
+      complete(*std::move(task), std::chrono::duration<double>(Clock::now() - began).count());
+      changed_.notify_all();
+    }
+  }
+
+  // The task that brings the oldest window on, of those that can run now.
+  std::optional<Task> take() ISOMESH_REQUIRES(mutex_) {
+    if (const auto next = waiting_.find({used_, used_parts_});
+        !is_ending_ && next != waiting_.end()) {
+      is_ending_ = true;
+      Task task = {Kind::kEnd, used_, used_parts_, std::move(next->second)};
+      waiting_.erase(next);
+      return task;
+    }
+    while (next_used_ < parts_.size() && next_part_ == parts_[next_used_]) {
+      ++next_used_;
+      next_part_ = 0;
+    }
+    // Parts that are done ahead of their turn wait in memory.
+    if (next_used_ < parts_.size() && waiting_.size() < 2 * threads_) {
+      return Task{Kind::kUse, next_used_, next_part_++, {}};
+    }
+    if (!is_smoothing_ && smoothed_ < count_ && written_[smoothed_]) {
+      is_smoothing_ = true;
+      return Task{Kind::kSmooth, smoothed_, 0, {}};
+    }
+    if (next_written_ < count_ && next_written_ < used_ + slots_.size()) {
+      return Task{Kind::kWrite, next_written_++, 0, {}};
+    }
+    return std::nullopt;
+  }
+
+  void run(Task& task) {
+    switch (task.kind) {
+      case Kind::kWrite:
+        at(task.window).first_layer = begin_of(task.window);
+        return surface_.write(begin_of(task.window), end_of(task.window), at(task.window).mesh);
+      case Kind::kSmooth:
+        see(task.window);
+        return smooth(task.window);
+      case Kind::kUse:
+        task.end = user_.work(at(task.window), task.part);
+        return;
+      case Kind::kEnd:
+        return task.end();
+    }
+  }
+
+  void complete(Task task, double seconds) ISOMESH_REQUIRES(mutex_) {
+    switch (task.kind) {
+      case Kind::kWrite:
+        written_[task.window] = true;
+        seconds_.extracting += seconds;
+        return;
+      case Kind::kSmooth:
+        is_smoothing_ = false;
+        ++smoothed_;
+        parts_.insert(parts_.end(), begun_.begin(), begun_.end());
+        begun_.clear();
+        seconds_.smoothing += seconds;
+        break;
+      case Kind::kUse:
+        waiting_[{task.window, task.part}] = std::move(task.end);
+        seconds_.using_it += seconds;
+        break;
+      case Kind::kEnd:
+        is_ending_ = false;
+        ++used_parts_;
+        seconds_.using_it += seconds;
+        break;
+    }
+    // A window whose parts have all ended gives its memory to another.
+    while (used_ < parts_.size() && used_parts_ == parts_[used_]) {
+      ++used_;
+      used_parts_ = 0;
+    }
+    if (context_.progress) {
+      context_.progress(static_cast<double>(used_) / static_cast<double>(count_));
+    }
+  }
+
+  // Copies the vertices of the next window's first layer to the place behind the window's own.
+  void copy_behind(std::size_t window) {
+    if (window + 1 == count_) return;
+    Mesh& mesh = at(window).mesh;
+    const Mesh& next = at(window + 1).mesh;
+    std::copy_n(next.positions.data(), next.layer_vertices[1],
+                mesh.positions.data() + mesh.layer_vertices[mesh.layers() - 1]);
+  }
+
+  // Shows triangles as they were extracted. The last layer of the window before has not moved yet.
+  void see(std::size_t window) {
+    Window& own = at(window);
+    own.below.clear();
+    if (window > 0) {
+      copy_behind(window - 1);
+      const Mesh& below = at(window - 1).mesh;
+      const std::size_t last = below.layers() - 2;
+      user_.see_extracted(below, below.layer_triangles[last], below.layer_triangles[last + 1]);
+      const auto behind = static_cast<std::uint32_t>(below.layer_vertices[last + 1]);
+      for (const auto& [a, b, c] : below.triangles_of(last, last + 1)) {
+        own.below.push_back({a - behind, b - behind, c - behind});
+      }
+      surface_.forget(begin_of(window - 1), end_of(window - 1));
+    }
+    const std::size_t layers = own.mesh.layers() - 1;
+    const bool is_last = window + 1 == count_;
+    user_.see_extracted(own.mesh, 0, own.mesh.layer_triangles[is_last ? layers : layers - 1]);
+  }
+
+  void smooth(std::size_t window) {
+    steps_->go_on(end_of(window));
+    flat_.go_on(steps_->moved());
+    for (; settled_ < count_; ++settled_) {
+      if (flat_.ended() < std::min<std::ptrdiff_t>(layers_.count(), end_of(settled_) + 1)) return;
+      copy_behind(settled_);
+      begun_.push_back(user_.begin(at(settled_)));
+    }
+  }
+
+  SurfaceWindows& surface_;
+  const Context& context_;
+  WindowUser& user_;
+  const std::size_t threads_;
+  const std::uint32_t depth_;
+  const std::size_t count_;  // of windows
+  std::vector<Window> slots_;
+  std::vector<float> shares_;
+  std::vector<SmoothedLayer> results_;
+  const SmoothedLayers layers_;
+
+  // Of the thread that smooths.
+  std::optional<LayerSteps> steps_;
+  FlatTriangles flat_;
+  std::size_t settled_ = 0;         // windows
+  std::vector<std::size_t> begun_;  // the parts of those that have settled in this task
+
+  Mutex mutex_;
+  Condition changed_;
+  bool has_failed_ ISOMESH_GUARDED_BY(mutex_) = false;
+  WalkSeconds seconds_ ISOMESH_GUARDED_BY(mutex_);
+  std::size_t next_written_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::vector<bool> written_ ISOMESH_GUARDED_BY(mutex_);
+  std::size_t smoothed_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  bool is_smoothing_ ISOMESH_GUARDED_BY(mutex_) = false;
+  std::vector<std::size_t> parts_ ISOMESH_GUARDED_BY(mutex_);  // of each settled window
+  std::size_t next_used_ ISOMESH_GUARDED_BY(mutex_) = 0;       // the next part to work on
+  std::size_t next_part_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  // Parts that wait for their turn to end.
+  std::map<std::pair<std::size_t, std::size_t>, WindowUser::InOrder> waiting_
+      ISOMESH_GUARDED_BY(mutex_);
+  bool is_ending_ ISOMESH_GUARDED_BY(mutex_) = false;
+  std::size_t used_ ISOMESH_GUARDED_BY(mutex_) = 0;  // windows before this have ended
+  std::size_t used_parts_ ISOMESH_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace
+
+bool can_walk(const SmoothOptions& options) {
+  return options.steps.empty() || options.steps.front().move == Move::kMean;
+}
+
+WalkEnd walk(SurfaceWindows& surface, const SmoothOptions& options, const Context& context,
+             WindowUser& user, std::uint32_t depth) {
+  if (depth == 0) depth = usual_depth(surface.count().triangles(), surface.layers());
+  return Walk(surface, options, context, user, depth).run();
+}
+
+std::uint64_t walking_memory(const SmoothOptions& options, const SurfaceSize& size,
+                             std::uint64_t plane_samples) {
+  const std::uint32_t depth = usual_depth(size.triangles, size.layers);
+  const std::uint64_t windows = windows_at_once(options.steps.size(), depth);
+  const std::uint64_t vertices = std::min(size.vertices, (depth + 1) * size.largest_layer);
+  // An open plane of triangles has two a vertex.
+  constexpr std::uint64_t kVertexBytes = sizeof(Vec3) + 2 * sizeof(Triangle);
+  constexpr std::uint64_t kIndexBytes = 8 * sizeof(std::uint32_t);  // a sample
+  return windows * vertices * kVertexBytes +
+         size.largest_layer * step_bytes_per_vertex(options.steps.size()) +
+         static_cast<std::uint64_t>(thread_count()) * plane_samples * kIndexBytes;
+}
+
+}  // namespace isomesh::mesh
