@@ -199,8 +199,9 @@ class Signs {
   static bool every_plane(double from, double to, Visit visit) {
     const double low = std::min(from, to);
     const double high = std::max(from, to);
-    double plane = std::ceil(low);
-    if (plane == low) ++plane;
+    // Numbers of planes may be negative; std::floor calls a function.
+    auto plane = static_cast<double>(static_cast<std::int64_t>(low));
+    if (plane <= low) ++plane;
     for (; plane < high; ++plane) {
       if (!visit(plane)) return false;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -50,6 +51,49 @@ class Cutter {
 
   const CubeCut cut_;
   const std::array<std::size_t, 3> counts_;
+};
+
+// The numbers of the vertices of some triangles in their order.
+class Ranks {
+ public:
+  // Appends the vertices to `names`.
+  Ranks(std::span<const Triangle> triangles, std::span<const std::uint32_t> members,
+        std::vector<std::uint32_t>& names) {
+    std::uint32_t last = 0;
+    for (const std::size_t t : members) {
+      const auto [low, high] = std::ranges::minmax(triangles[t]);
+      first_ = std::min(first_, low);
+      last = std::max(last, high);
+    }
+    words_.resize((last - first_) / 64 + 1);
+    for (const std::size_t t : members) {
+      for (const std::uint32_t v : triangles[t]) {
+        words_[(v - first_) / 64].set |= std::uint64_t{1} << ((v - first_) % 64);
+      }
+    }
+    for (std::size_t w = 0; w < words_.size(); ++w) {
+      words_[w].before = static_cast<std::uint32_t>(names.size());
+      for (std::uint64_t rest = words_[w].set; rest != 0; rest &= rest - 1) {
+        names.push_back(first_ + static_cast<std::uint32_t>(64 * w) +
+                        static_cast<std::uint32_t>(std::countr_zero(rest)));
+      }
+    }
+  }
+
+  std::uint32_t of(std::uint32_t vertex) const {
+    const auto& [set, before] = words_[(vertex - first_) / 64];
+    const std::uint64_t lower = (std::uint64_t{1} << ((vertex - first_) % 64)) - 1;
+    return before + static_cast<std::uint32_t>(std::popcount(set & lower));
+  }
+
+ private:
+  struct Word {
+    std::uint64_t set = 0;
+    std::uint32_t before = 0;  // how many are set in earlier words
+  };
+
+  std::uint32_t first_ = ~std::uint32_t{0};
+  std::vector<Word> words_;
 };
 
 Cubes cut_cubes(std::span<const Triangle> triangles,
@@ -117,19 +161,11 @@ void Patches::collapse(const CubeCut& cut, const Context& context,
 
 Patch Patches::patch_of(std::span<const std::uint32_t> members, bool is_for_seams) const {
   Patch patch;
-  for (const std::size_t t : members) {
-    patch.names.insert(patch.names.end(), triangles_[t].begin(), triangles_[t].end());
-  }
-  std::ranges::sort(patch.names);
-  patch.names.erase(std::unique(patch.names.begin(), patch.names.end()), patch.names.end());
-  const auto number_of = [&](std::uint32_t name) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(patch.names, name) -
-                                      patch.names.begin());
-  };
+  const Ranks ranks(triangles_, members, patch.names);
   patch.triangles.reserve(members.size());
   for (const std::size_t t : members) {
     const auto& [a, b, c] = triangles_[t];
-    patch.triangles.push_back({number_of(a), number_of(b), number_of(c)});
+    patch.triangles.push_back({ranks.of(a), ranks.of(b), ranks.of(c)});
     if (!numbers_.empty()) patch.numbers.push_back(numbers_[t]);
   }
   patch.stays.assign(patch.names.size(), 0);

@@ -178,15 +178,14 @@ class Starter {
     tube_.border[v] = static_cast<std::uint8_t>(
         is_in_face(field_.dims, field_.place(inside), field_.place(outside)));
     stepped_[v] = tube_.border[v];
-    tube_.vertices[v] = on_lattice_edge(surface_, origin);
+    Vecd place = place_of(surface_, origin);
     if (surface_.mesh.is_on_border(origin)) {
-      Vecd place = place_of(surface_, origin);
       tube_.planes[v] = static_cast<std::uint8_t>(pin(surface_, place));
     }
     const bool is_elsewhere = surface_.is_moved || tube_.planes[v] != 0;
-    if (is_elsewhere && stepped_[v] == 0) {
-      tube_.vertices[v].p = snap(place_of(surface_, origin));
-    }
+    tube_.vertices[v].p = is_elsewhere && stepped_[v] == 0
+                              ? snap(place)
+                              : on_lattice_edge(surface_, origin).p;
   }
 
   static bool is_empty(const Triangle& corners) {

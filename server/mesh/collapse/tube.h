@@ -45,8 +45,10 @@ inline constexpr float kPlaces = 65536;
 
 inline Vecf snap(Vecd a) {
   const auto round = [](double x) {
+    // Beside this number doubles are whole. std::nearbyint calls a function.
+    constexpr double kWhole = 0x1.8p52;
     // Single precision has the nearest multiple, or of large numbers a coarser one.
-    return static_cast<float>(std::nearbyint(x * double{kPlaces}) / double{kPlaces});
+    return static_cast<float>(((x * double{kPlaces} + kWhole) - kWhole) / double{kPlaces});
   };
   return {round(a.x), round(a.y), round(a.z)};
 }

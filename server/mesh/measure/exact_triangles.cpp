@@ -162,13 +162,18 @@ bool meet_anywhere(const Vertices& a, const Vertices& b) {
 }
 
 // Two triangles share one vertex, the first of each. If they meet elsewhere, it is in a segment
-// from that vertex to the far side of one of them, or they touch at a far side.
+// from that vertex to the far side of one of them, or they touch at a far side. So they do not where
+// a far side is on one side of the other's plane.
 bool meet_beyond_vertex(const Vertices& a, const Vertices& b) {
-  const auto far_side_meets = [](const Vertices& of, const Vertices& t) {
+  const auto sides_of_far = [](const Vertices& of, const Vertices& t) {
     const Plane plane(t);
-    return meet({of[1], of[2]}, plane.side_of(of[1]), plane.side_of(of[2]), t);
+    return std::array{plane.side_of(of[1]), plane.side_of(of[2])};
   };
-  return far_side_meets(b, a) || far_side_meets(a, b);
+  const auto [b1, b2] = sides_of_far(b, a);
+  if (b1 * b2 > 0) return false;
+  const auto [a1, a2] = sides_of_far(a, b);
+  if (a1 * a2 > 0) return false;
+  return meet({b[1], b[2]}, b1, b2, a) || meet({a[1], a[2]}, a1, a2, b);
 }
 
 // Along a common edge, their first two corners, two triangles meet nowhere else, unless one lies

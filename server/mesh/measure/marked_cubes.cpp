@@ -41,9 +41,10 @@ MarkedCubes::MarkedCubes(std::span<const Box> boxes, double reach_mm) : reach_mm
     sum += std::max({box.high[0] - box.low[0], box.high[1] - box.low[1], box.high[2] - box.low[2]});
   }
   const double mean = sum / static_cast<double>(boxes.size());
-  side_mm_ = std::max({2 * reach_mm, longest / (kMostCubes - 1), mean, 1e-12});
+  const double side_mm = std::max({2 * reach_mm, longest / (kMostCubes - 1), mean, 1e-12});
+  per_mm_ = 1 / side_mm;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    count_[axis] = static_cast<std::size_t>((all.high[axis] - all.low[axis]) / side_mm_) + 1;
+    count_[axis] = static_cast<std::size_t>((all.high[axis] - all.low[axis]) * per_mm_) + 1;
   }
   is_marked_.assign(count_[0] * count_[1] * count_[2], false);
   for (const Box& box : boxes) {
@@ -64,8 +65,8 @@ MarkedCubes::CubeRange MarkedCubes::around(const Box& box) const {
   CubeRange range;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto count = static_cast<double>(count_[axis]);
-    const double first = (box.low[axis] - reach_mm_ - low_[axis]) / side_mm_;
-    const double last = (box.high[axis] + reach_mm_ - low_[axis]) / side_mm_;
+    const double first = (box.low[axis] - reach_mm_ - low_[axis]) * per_mm_;
+    const double last = (box.high[axis] + reach_mm_ - low_[axis]) * per_mm_;
     if (!(first < count) || !(last >= 0)) return {{1, 1, 1}, {0, 0, 0}};
     range.low[axis] = static_cast<std::size_t>(std::max(first, 0.0));
     range.high[axis] = static_cast<std::size_t>(std::min(last, count - 1));

@@ -41,7 +41,7 @@ class MarkedCubes {
 
   double reach_mm_;
   Point low_ = {0, 0, 0};
-  double side_mm_ = 1;
+  double per_mm_ = 1;  // cubes
   Cube count_ = {1, 1, 1};
   std::vector<bool> is_marked_;
 };
