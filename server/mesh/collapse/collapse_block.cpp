@@ -19,7 +19,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::collapse::HWY_NAMESPACE {
 
-constexpr int kEasy = 12;  // buckets below which an edge's end is tried before the best place
+constexpr int kEasy = 8;  // buckets below which only an edge's end is tried, not the best place
 constexpr float kLargestCost = 1.5F;  // of the reach, as a distance
 constexpr float kShift = 0.4F;        // of the reach: away from a side that fails by little
 
@@ -87,8 +87,7 @@ class Prover : private Collapser<Prover<Test>> {
     const unsigned of_b = block_.planes[b];
     // Caps stay in the faces of the volume, and their edges in both.
     if ((of_a & ~of_b) != 0) return false;
-    if (stays(b) || of_a != of_b) return to_end(a, k, bucket);
-    if (bucket < kEasy) return to_end(a, k, bucket) || to_best(a, k, bucket);
+    if (stays(b) || of_a != of_b || bucket < kEasy) return to_end(a, k, bucket);
     return to_best(a, k, bucket) || to_end(a, k, bucket);
   }
 

@@ -183,9 +183,8 @@ class Starter {
       tube_.planes[v] = static_cast<std::uint8_t>(pin(surface_, place));
     }
     const bool is_elsewhere = surface_.is_moved || tube_.planes[v] != 0;
-    tube_.vertices[v].p = is_elsewhere && stepped_[v] == 0
-                              ? snap(place)
-                              : on_lattice_edge(surface_, origin).p;
+    tube_.vertices[v].p =
+        is_elsewhere && stepped_[v] == 0 ? snap(place) : on_lattice_edge(surface_, origin).p;
   }
 
   static bool is_empty(const Triangle& corners) {

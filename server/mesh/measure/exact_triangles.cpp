@@ -162,8 +162,8 @@ bool meet_anywhere(const Vertices& a, const Vertices& b) {
 }
 
 // Two triangles share one vertex, the first of each. If they meet elsewhere, it is in a segment
-// from that vertex to the far side of one of them, or they touch at a far side. So they do not where
-// a far side is on one side of the other's plane.
+// from that vertex to the far side of one of them, or they touch at a far side. So they do not
+// where a far side is on one side of the other's plane.
 bool meet_beyond_vertex(const Vertices& a, const Vertices& b) {
   const auto sides_of_far = [](const Vertices& of, const Vertices& t) {
     const Plane plane(t);
