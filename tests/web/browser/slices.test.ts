@@ -118,9 +118,8 @@ describe('a slice', () => {
     const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
     const before = noted(page, 'window');
     await drag(page, [x, y], [x + 6 * scale, y + 3 * scale]);
-    await expect.poll(() => noted(page, 'at')).not.toBe('24,24,24');
-    const [i = 0, j = 0, k] = noted(page, 'at').split(',').map(Number);
-    expect([Math.abs(Math.abs(i - 24) - 6) <= 1, Math.abs(Math.abs(j - 24) - 3) <= 1, k]).toEqual([true, true, 24]);
+    // The address has the last place soon.
+    await expect.poll(() => noted(page, 'at').split(',').map((one, axis) => Math.abs(Math.abs(Number(one) - 24) - ([6, 3, 0][axis] ?? 0)) <= 1)).toEqual([true, true, true]);
     expect(noted(page, 'window')).toBe(before);
     await drag(page, [x - 60, y - 60], [x - 20, y - 60]);
     await expect.poll(() => noted(page, 'window')).not.toBe(before);
@@ -294,7 +293,7 @@ describe('slices before there is a mesh', () => {
     const scale = (Math.min(box.width, box.height) - 28) / 48;
     await canvas.click({ position: { x: box.width / 2 - 10 * scale, y: box.height / 2 } });
     await canvas.click({ position: { x: box.width / 2 + 10 * scale, y: box.height / 2 } });
-    await expect.poll(() => canvas.getAttribute('aria-label')).toMatch(/, (19\.[5-9]|20(\.[0-5])?) mm$/);
+    await expect.poll(() => canvas.getAttribute('aria-label')).toMatch(/, (19\.[5-9]|20(\.[0-5])?) mm(, \d+ to \d+)?$/);
     expect(noted(page, 'at')).toBe(place);
     // The length stands on its ground, 8 pixels from the point, and not over the point.
     const coloured = (from: number, to: number): Promise<number> =>
