@@ -62,6 +62,8 @@ std::uint64_t usable_memory(const std::filesystem::path& root) {
   return least;
 }
 
+void give_back_freed_memory() { ::malloc_trim(0); }
+
 void keep_freed_memory() {
   constexpr int kLargestBlockBytes = 32 << 20;  // the largest that the C library allows
   constexpr int kKeptBytes = 256 << 20;

@@ -11,6 +11,9 @@ namespace isomesh::jobs {
 // start. What is kept is bounded.
 void keep_freed_memory();
 
+// Returns what is kept all the same, between parts of a job that use blocks of other sizes.
+void give_back_freed_memory();
+
 // The memory that this process may use, in bytes: the least of the machine's and the limits of its
 // control group (version 2 or 1) and those above. `root` is the folder that contains /proc and
 // /sys.

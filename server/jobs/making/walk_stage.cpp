@@ -9,6 +9,7 @@
 #include "base/mutex.h"
 #include "proto/samples.h"
 #include "server/codec/facet_file.h"
+#include "server/jobs/making/memory.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
 #include "server/mesh/extract/windows.h"
@@ -129,6 +130,7 @@ MeshSummary walk_stage(const SampleArray& samples, const MeshRequest& request,
     const mesh::SurfaceSize surface = size_of(windows.count());
     check_memory(surface, lattice.dims.samples(), request);
     check_disk(surface, request);
+    if (spool != nullptr) give_back_freed_memory();
     constexpr std::array kMeanwhile = {Stage::kSmooth};
     progress.enter(Stage::kEncode, kMeanwhile);
     FacetFiles files(request, sinks, surface, progress.quiet());

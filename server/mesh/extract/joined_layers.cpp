@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
 
 namespace isomesh::mesh {
 namespace {
@@ -34,7 +35,7 @@ void JoinedLayers::put_aside(std::uint32_t begin, std::uint32_t end) {
       const auto written = std::as_bytes(std::span(array));
       if (!written.empty()) spool_->write(at, written);
       at += written.size();
-      array = {};
+      array = std::remove_cvref_t<decltype(array)>();  // unlike {}, frees the memory
     });
   }
 }

@@ -12,8 +12,8 @@
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
 #include "server/mesh/smooth/fan_moves.h"
-#include "server/mesh/smooth/rings.h"
 #include "server/mesh/smooth/layer_steps.h"
+#include "server/mesh/smooth/rings.h"
 
 namespace isomesh::mesh {
 namespace {

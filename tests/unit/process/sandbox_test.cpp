@@ -303,6 +303,17 @@ TEST_F(JobSandbox, LimitsMemoryAgainAndAgain) {
   }));
 }
 
+// Memory of the process does not count what is set aside in a file, but the file has a limit.
+TEST_F(JobSandbox, WritesOnlySoMuchToWhatIsOpen) {
+  const Descriptor spool(::open((folder_ / "spool").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  EXPECT_TRUE(ends_well([&] {
+    confine_job(100);
+    const std::array<char, 60> bytes = {};
+    return ::pwrite(spool.number(), bytes.data(), 60, 0) == 60 &&
+           fails(::pwrite(spool.number(), bytes.data(), 60, 100), EFBIG);
+  }));
+}
+
 // Root may raise limits, unless it has no capabilities.
 TEST_F(JobSandbox, CannotRaiseTheMostMemory) {
   EXPECT_TRUE(ends_well([&] {

@@ -1,0 +1,111 @@
+// Jobs whose files are written while the surface is walked through.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "server/jobs/making/mesh_cost.h"
+#include "server/jobs/making/spool_file.h"
+#include "server/jobs/queue/pipeline.h"
+#include "tests/support/errors.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::jobs {
+namespace {
+
+// All that a record tells of a mesh, but for its files.
+std::string without_files(MeshSummary summary) {
+  summary.files.clear();
+  Job job;
+  job.mesh = std::move(summary);
+  return to_record(job);
+}
+
+class WalkJobs : public test::PipelineFixture {};
+
+// With a format that needs the whole surface, all of the job is made of it.
+TEST_F(WalkJobs, WriteAndTellWhatIsMadeOfTheWholeSurface) {
+  const Volume volume =
+      add(test::noise<std::uint8_t>({0, 1, 2, 9}, {19, 17, 40}, 9), SampleType::kUint8);
+  JobParameters parameters = parameters_of(volume, 1);
+  std::vector<JobParameters> ways(4, parameters);
+  ways[1].passes = 0;
+  ways[2].close = true;
+  ways[2].smoothing = Smoothing::kTaubin;
+  ways[3].space = Space::kRas;
+  ways[3].max_displacement_mm = 0.1;
+  for (JobParameters& way : ways) {
+    way.formats = {MeshFormat::kStl};
+    ASSERT_TRUE(is_walked(way, false));
+    const MeshSummary walked = run(volume, way).mesh;
+    way.formats = {MeshFormat::kStl, MeshFormat::kOff};
+    ASSERT_FALSE(is_walked(way, false));
+    const MeshSummary whole = run(volume, way).mesh;
+    EXPECT_EQ(walked.files.at(MeshFormat::kStl).sha256, whole.files.at(MeshFormat::kStl).sha256);
+    EXPECT_EQ(without_files(walked), without_files(whole));
+  }
+}
+
+TEST(IsWalked, OnlyWithoutWhatNeedsTheWholeSurface) {
+  MeshParameters parameters;
+  parameters.formats = {MeshFormat::kStl};
+  EXPECT_TRUE(is_walked(parameters, false));
+  EXPECT_FALSE(is_walked(parameters, true));
+  const auto with = [&](auto change) {
+    MeshParameters changed = parameters;
+    change(changed);
+    return is_walked(changed, false);
+  };
+  EXPECT_FALSE(with([](MeshParameters& p) { p.formats = {MeshFormat::kGlb}; }));
+  EXPECT_FALSE(with([](MeshParameters& p) { p.components.keep = 1; }));
+  EXPECT_FALSE(with([](MeshParameters& p) { p.fill_cavities = true; }));
+  EXPECT_FALSE(with([](MeshParameters& p) { p.untangle = true; }));
+  EXPECT_FALSE(with([](MeshParameters& p) { p.triangles = 1000; }));
+  EXPECT_FALSE(with([](MeshParameters& p) { p.max_error_mm = 1; }));
+  EXPECT_FALSE(with([](MeshParameters& p) { p.smoothing = Smoothing::kOptimize; }));
+}
+
+// With twice as many layers only the crossings that are counted and not set aside yet are more.
+TEST(EstimateMemory, FollowsTheLayerOfAWalk) {
+  MeshParameters parameters;
+  parameters.formats = {MeshFormat::kStl};
+  const mesh::SurfaceSize surface = {
+      .triangles = 60'000'000, .vertices = 30'000'000, .layers = 1024, .largest_layer = 45'000};
+  const mesh::SurfaceSize twice = {
+      .triangles = 120'000'000, .vertices = 60'000'000, .layers = 2048, .largest_layer = 45'000};
+  const std::uint64_t samples = std::uint64_t{1} << 30;
+  const std::uint64_t needed = estimate_memory(surface, samples, parameters, false);
+  EXPECT_LT(needed, std::uint64_t{450} << 20);
+  EXPECT_LT(estimate_memory(twice, 2 * samples, parameters, false), needed * 4 / 3);
+  EXPECT_GT(estimate_memory(surface, samples, parameters, true), 3 * needed);
+}
+
+TEST(SpoolFile, GivesBackWhatItTook) {
+  const test::TemporaryFolder folder;
+  SpoolFile spool(folder.path());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << "it has no name";
+  const std::array<std::byte, 3> bytes = {std::byte{1}, std::byte{2}, std::byte{3}};
+  spool.write(5'000'000'000, bytes);
+  std::array<std::byte, 3> read = {};
+  spool.read(5'000'000'000, read);
+  EXPECT_EQ(read, bytes);
+  spool.clear();
+  EXPECT_EQ(test::code_thrown_by([&] { spool.read(5'000'000'000, read); }), ErrorCode::kInternal);
+}
+
+TEST(SpoolFile, SaysThatTheDiskIsFull) {
+  SpoolFile spool(Descriptor(::open("/dev/full", O_RDWR | O_CLOEXEC)));
+  const std::array<std::byte, 3> bytes = {};
+  EXPECT_EQ(test::code_thrown_by([&] { spool.write(0, bytes); }), ErrorCode::kOutOfSpace);
+}
+
+}  // namespace
+}  // namespace isomesh::jobs
