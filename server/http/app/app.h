@@ -9,7 +9,7 @@
 #include "server/http/connections/connections.h"
 #include "server/http/guards/access.h"
 #include "server/http/guards/origin.h"
-#include "server/http/observe/read_trail.h"
+#include "server/http/guards/read_trail.h"
 #include "server/http/observe/readiness.h"
 #include "server/http/requests/kept_uploads.h"
 #include "server/http/requests/response.h"

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
+
 #include "server/import/dicom/geometry/image.h"
 #include "tests/unit/import/files.h"
 
@@ -113,6 +115,11 @@ std::string compressed(std::string_view transfer_syntax, const dicom::PixelLayou
 // Imports files by names and bytes as import_dicom does; scratch files that are left are an error.
 Outcome import_objects(const NamedFiles& files, const ImportOptions& options = {},
                        const SizeLimits& limits = {});
+
+// A choice, whatever tells its series apart.
+MATCHER_P3(IsChoice, parameter, value, title, "") {
+  return arg.parameter == parameter && arg.value == value && arg.title == title;
+}
 
 // The detail of the volume's note of that code; empty when there is none.
 std::string note_detail(const Outcome& outcome, NoteCode code);

@@ -267,7 +267,7 @@ TEST(DicomRefusal, OfSequencesThatLieTooDeep) {
 // --- Several series and other objects ------------------------------------------------------------
 
 NamedFiles two_series() {
-  NamedFiles files = DicomSeries{}.files();
+  NamedFiles files = changed({}, setting(kStudyInstanceUid, "UI", "1.2.3"));
   const NamedFiles others =
       changed({.slices = 4, .uid = "1.2.3.9"}, setting(kSeriesDescription, "LO", "scout"));
   for (const auto& [name, file] : others) files.emplace_back("B" + name, file);
@@ -286,7 +286,7 @@ TEST(DicomChoice, IsAskedForWhenThereAreSeveralSeries) {
   EXPECT_EQ(second.title, "scout, CT, 4 slices");
   // They are shown to a person, who knows them by these.
   ASSERT_TRUE(first.series && first.series->picture);
-  EXPECT_FALSE(first.series->study_uid.empty());
+  EXPECT_EQ(first.series->study_uid, "1.2.3");
   const ChoicePicture& picture = *first.series->picture;
   EXPECT_EQ(from_base64(picture.grey)->size(), std::size_t{picture.width} * picture.height);
 }

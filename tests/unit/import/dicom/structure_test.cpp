@@ -215,8 +215,8 @@ TEST(DicomStructures, AreOneOfTheSeriesOfTheirUpload) {
   const DicomObject object = structure_set({{.contours = {{box(1.5, 1.5, 5.5, 5.5, 4)}}}});
   const Outcome all = import_objects(with_images(object));
   EXPECT_THAT(all.remedy.choices,
-              ElementsAre(Choice{"series", "1.2.3.4", "CT, 8 slices"},
-                          Choice{"series", "1.2.9", "plan, RTSTRUCT, contours of structures"}));
+              ElementsAre(IsChoice("series", "1.2.3.4", "CT, 8 slices"),
+                          IsChoice("series", "1.2.9", "plan, RTSTRUCT, contours of structures")));
   EXPECT_EQ(import_objects(with_images(object), {.series = "1.2.3.4"}).volume.modality, "CT");
 }
 

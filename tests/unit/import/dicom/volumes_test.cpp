@@ -313,8 +313,8 @@ TEST(DicomUpload, NamesASeriesWithoutUidByItsNumber) {
   });
   for (const auto& [name, file] : others) files.emplace_back("N" + name, file);
   const Outcome all = import_objects(files);
-  EXPECT_THAT(all.remedy.choices, ElementsAre(Choice{"series", "1.2.3.4", "CT, 6 slices"},
-                                              Choice{"series", "3.0", "neck, CT, 3 slices"}));
+  EXPECT_THAT(all.remedy.choices, ElementsAre(IsChoice("series", "1.2.3.4", "CT, 6 slices"),
+                                              IsChoice("series", "3.0", "neck, CT, 3 slices")));
   EXPECT_THAT(all.error, HasSubstr("neck, CT, 3 slices (3.0)"));
   EXPECT_EQ(import_objects(files, {.series = "3.0"}).volume.dims[2], 3);
 }
@@ -384,8 +384,8 @@ TEST(DicomUpload, TellsEqualSeriesApartByTheirNumbers) {
     }
   }
   EXPECT_THAT(import_objects(files).remedy.choices,
-              ElementsAre(Choice{"series", "1.2.1", "CT, 6 slices, series 1"},
-                          Choice{"series", "1.2.2", "CT, 6 slices, series 2"}));
+              ElementsAre(IsChoice("series", "1.2.1", "CT, 6 slices, series 1"),
+                          IsChoice("series", "1.2.2", "CT, 6 slices, series 2")));
 }
 
 TEST(DicomUpload, OfOneSliceSaysThatItIsOne) {

@@ -1,4 +1,4 @@
-#include "server/http/observe/read_trail.h"
+#include "server/http/guards/read_trail.h"
 
 #include <algorithm>
 #include <string_view>
