@@ -207,6 +207,7 @@ describe('iso-values with names', () => {
     await presets.getByRole('button', { name: 'Save as preset' }).click();
     await page.getByRole('textbox', { name: 'Name for the iso-value 612' }).fill('cage');
     await page.keyboard.press('Enter');
+    await presets.getByRole('button', { name: 'cage 612' }).waitFor();
     await page.locator('.iso-input').fill('5');
     await page.reload();
     await presets.getByRole('button', { name: 'cage 612' }).click();

@@ -186,11 +186,10 @@ describe('slices before there is a mesh', () => {
 
   it('show another volume over them where it lies in the patient, and the maximum of a slab', async ({ page, daemon }) => {
     // A block of 11 mm on the left and at the back of the ball, whose axes run in another order and the other way.
-    
     const block = Buffer.alloc(12 ** 3, 200);
     const header = 'NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 12 12 12\nspace directions: (0,1,0) (1,0,0) (0,0,-1)\nspace origin: (30,30,35)\nencoding: raw\n\n';
     block[0] = 0;
-    await daemon.upload(Buffer.concat([Buffer.from(header), block]));
+    const overlay = await daemon.upload(Buffer.concat([Buffer.from(header), block]));
     await page.goto('about:blank');
     await page.goto(`${daemon.url}/#/volumes/${ball}?iso=100&at=24,24,30`);
     await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
@@ -207,7 +206,7 @@ describe('slices before there is a mesh', () => {
       });
     expect((await coloured()).count).toBe(0);
     const other = page.getByLabel('Overlay', { exact: true });
-    await other.selectOption({ index: 1 });
+    await other.selectOption(overlay);
     await expect.poll(async () => (await coloured()).count).toBeGreaterThan(100);
     expect(await coloured()).toMatchObject({ isRight: true, isBelow: true });
     await page.getByLabel('Opacity of the overlay').fill('0');
