@@ -229,7 +229,7 @@ describe('slices before there is a mesh', () => {
     await page.getByRole('radio', { name: 'Length' }).check({ force: true });
     const axial = page.locator('[data-plane=axial] canvas');
     for (const x of [200, 300]) await axial.click({ position: { x, y: 300 } });
-    await expect.poll(() => axial.getAttribute('aria-label')).toMatch(/mm$/);
+    await expect.poll(() => axial.getAttribute('aria-label')).toMatch(/ mm, \d+ to \d+$/);
     const said = await axial.getAttribute('aria-label');
     await expect.poll(() => noted(page, 'measured')).toMatch(/^length,axial,8,/);
     await page.reload();
