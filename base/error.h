@@ -60,7 +60,7 @@ struct ChoicePicture {
   bool operator==(const ChoicePicture&) const = default;
 };
 
-// What tells series apart, in DICOM's forms; empty where a file does not say.
+// The facts that tell series apart, in DICOM's forms; empty where a file does not say.
 struct SeriesFacts {
   std::string patient_name = {};
   std::string patient_id = {};

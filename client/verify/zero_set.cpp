@@ -89,8 +89,8 @@ class March {
     std::vector<unsigned> out;
     for (const unsigned c : corners) ((inside >> c & 1) != 0 ? in : out).push_back(c);
     if (in.empty() || out.empty()) return;
-    // Where a point is at a corner, as on a cap, a triangle can lie in a face of the tetrahedron:
-    // then only some of its corners are beside the triangle.
+    // A triangle can lie in a face of the tetrahedron if its points are at corners, as on a cap:
+    // then only some of the corners are beside it.
     Vec outwards = {0, 0, 0};
     for (const unsigned inner : in) {
       for (const unsigned outer : out) outwards = outwards + (place(outer) - place(inner));

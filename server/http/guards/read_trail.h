@@ -22,7 +22,8 @@ namespace isomesh::http {
 // A view of a volume requests a hundred slices. The first request of a caller for one kind of data
 // of one volume or job is entered before its response is sent; the requests within a window after
 // it are counted, and entered as one number when the window ends. If the process is killed, only
-// such a number is lost. Data without a patient is not entered. Thread safe.
+// such a number is lost. Data of volumes that did not come as DICOM is not entered, but the mesh of
+// an erased volume is, without its patient. Thread safe.
 class ReadTrail {
  public:
   struct Stores {

@@ -1,4 +1,4 @@
-// What a preview shows, and who paints it.
+// The content of a preview, and its painter.
 import { Matrix4, Vector3, type PerspectiveCamera } from 'three';
 import type { Look } from '../volume/looks';
 import { blockSize, type Preview } from '../volume/preview';

@@ -132,11 +132,11 @@ export interface Statistics {
   greatest: number;
 }
 
-// Of the samples whose middles lie within a polygon; null where there is none.
+// The statistics of the samples whose middles lie within a polygon; null where there is none.
 export function statisticsIn(slice: Samples, corners: readonly Point[]): Statistics | null {
   const values: number[] = [];
   for (let row = 0; row < slice.height; row += 1) {
-    // Where the row goes in and out.
+    // The places where the row goes in and out.
     const crossings = corners
       .flatMap(([x, y], at) => {
         const [nextX, nextY] = corners[(at + 1) % corners.length] as Point;

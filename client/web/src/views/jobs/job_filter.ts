@@ -1,4 +1,4 @@
-// Which jobs are listed, and in which order: what the server sorts out, and what is searched for in the list.
+// The jobs that are listed, and their order: the server sorts some out, and the list is searched.
 import { client } from '../../client';
 import type { Job, JobState } from '../../api/types';
 import type { JobSource } from '../../job/job_list';
