@@ -1,27 +1,69 @@
+import type { Login } from '../api/types';
 import { token, unauthorized } from '../client';
+import { asApiError } from '../api/problem';
 import { button, field, h } from './dom';
+import { beginLogin, findLogin } from './login';
+import { tellError } from './notices';
 import { Signal } from './signal';
 
 // True if the dialog was closed without a token.
 const isDeclined = new Signal<boolean>(false);
 
-// Asks for a token whenever the daemon rejects a request that has none.
+// What the dialog offers.
+interface Ways {
+  login: Login | null;
+  hasTokens: boolean;
+  // Why there may be no login now.
+  trouble: string;
+}
+
+async function findWays(): Promise<Ways> {
+  try {
+    const login = await findLogin();
+    return { login, hasTokens: login?.tokens ?? true, trouble: '' };
+  } catch (error) {
+    return { login: null, hasTokens: true, trouble: asApiError(error).detail };
+  }
+}
+
+function dialogTexts({ login }: Ways): [title: string, text: string] {
+  const isFirst = token.value === '';
+  if (login) {
+    const text = isFirst ? 'You continue here after the login.' : 'Your login has expired, or this server does not accept it.';
+    return ['This server requires a login', text];
+  }
+  const text = isFirst
+    ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
+    : 'This server does not accept the token. It may have expired.';
+  return ['This server requires a token', text];
+}
+
+function loginButton(login: Login): HTMLButtonElement {
+  const go = (): void => {
+    beginLogin(login).catch(tellError);
+  };
+  return button('Log in', go, { class: 'primary', autofocus: true });
+}
+
+// Asks for a login or a token whenever the daemon rejects a request that has none.
 export function watchToken(onToken: () => void): void {
   let dialog: HTMLDialogElement | null = null;
-  const open = (): void => {
-    if (dialog) return;
+  let isOpening = false;
+  const open = (ways: Ways): void => {
+    const { login, hasTokens, trouble } = ways;
+    const [title, text] = dialogTexts(ways);
     const input = h('input', { type: 'password', autocomplete: 'off', required: true, name: 'token' });
     const form = h('form', { method: 'dialog' }, [
-      h('h2', 'This server requires a token'),
-      h('p', [
-        token.value === ''
-          ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
-          : 'This server does not accept the token. It may have expired.',
-      ]),
       field('Token', input),
-      h('div.actions', h('button.primary', { type: 'submit' }, 'Continue')),
+      h('div.actions', h(login ? 'button' : 'button.primary', { type: 'submit' }, 'Continue')),
     ]);
-    const made = h('dialog.dialog', { 'aria-label': 'Token' }, form);
+    const made = h('dialog.dialog', { 'aria-label': login ? 'Login' : 'Token' }, [
+      h('h2', title),
+      h('p', text),
+      trouble !== '' && h('p', `Nobody can log in at the moment: ${trouble}.`),
+      login && h('div.actions', loginButton(login)),
+      hasTokens && form,
+    ]);
     dialog = made;
     form.addEventListener('submit', (event) => {
       event.preventDefault();
@@ -45,12 +87,19 @@ export function watchToken(onToken: () => void): void {
     });
     document.body.append(made);
     made.showModal();
-    input.focus();
+    if (!login) input.focus();
+  };
+  const findAndOpen = async (): Promise<void> => {
+    if (dialog || isOpening) return;
+    isOpening = true;
+    const ways = await findWays();
+    isOpening = false;
+    open(ways);
   };
   unauthorized.watch((isWanted) => {
     if (!isWanted) return;
     if (isDeclined.value) unauthorized.value = false;
-    else open();
+    else void findAndOpen();
   });
   window.addEventListener('hashchange', () => (isDeclined.value = false));
 }
