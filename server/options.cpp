@@ -345,8 +345,8 @@ void add_options(CLI::App& cli, Options& options) {
     row.limits(added);
   }
   cli.get_option("--tls-key")->needs("--tls-cert");
-  for (const char* name : {"--oidc-audience", "--oidc-client-id", "--oidc-role-claim",
-                           "--oidc-role", "--oidc-parameter", "--oidc-ca"}) {
+  for (const char* name :
+       {"--oidc-audience", "--oidc-client-id", "--oidc-role", "--oidc-parameter", "--oidc-ca"}) {
     cli.get_option(name)->needs("--oidc-issuer");
   }
   add_operator_overrides(cli, options);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/error.h"
+#include "proto/json_text.h"
 
 namespace isomesh::oidc {
 namespace {
@@ -16,7 +17,7 @@ constexpr std::size_t kDeepest = 16;
 // Called by the parser for each part of a document.
 class Watch {
  public:
-  bool operator()(int /*depth*/, Json::parse_event_t event, const Json& value) {
+  bool operator()(Json::parse_event_t event, const Json& value) {
     if (event == Json::parse_event_t::object_start) {
       names_.emplace_back();
     } else if (event == Json::parse_event_t::object_end) {
@@ -46,10 +47,9 @@ class Watch {
 JsonTree strict_object(std::string_view text) {
   Watch watch;
   JsonTree tree;
-  tree.root() = Json::parse(
-      text,
-      [&](int depth, Json::parse_event_t event, Json& value) { return watch(depth, event, value); },
-      false);
+  const Json::parser_callback_t watching = [&](int /*depth*/, Json::parse_event_t event,
+                                               const Json& value) { return watch(event, value); };
+  tree.root() = parse_json<Json>(text, watching, false);
   if (!tree.root().is_object()) throw Error(ErrorCode::kInvalidParameter, "is no JSON object");
   return tree;
 }

@@ -55,23 +55,27 @@ void answer_file(const App& app, const Request& request, Response& response) {
                      .length = bytes.size()};
 }
 
+void write_provider(Json& place, const oidc::PageLogin& login) {
+  using json_values::write_field;
+  json_values::make_object(place);
+  write_field(place, "issuer", login.issuer);
+  write_field(place, "client_id", login.client_id);
+  write_field(place, "authorization_endpoint", login.authorization_endpoint);
+  write_field(place, "token_endpoint", login.token_endpoint);
+  write_field(place, "token", std::string(login.uses_id_token ? "id_token" : "access_token"));
+  Json& parameters = json_values::member(place, "parameters");
+  json_values::make_object(parameters);
+  for (const auto& [name, value] : login.parameters) write_field(parameters, name.c_str(), value);
+}
+
 // How the page logs a person in.
 void answer_login(const App& app, Response& response) {
   const oidc::Provider* provider = app.logins.provider;
   const auto login = provider == nullptr ? std::nullopt : provider->page_login();
-  if (!login) throw Error(ErrorCode::kNotFound, "this server has no login provider for the page");
-  using json_values::write_field;
   JsonTree answer;
-  write_field(answer.root(), "issuer", login->issuer);
-  write_field(answer.root(), "client_id", login->client_id);
-  write_field(answer.root(), "authorization_endpoint", login->authorization_endpoint);
-  write_field(answer.root(), "token_endpoint", login->token_endpoint);
-  write_field(answer.root(), "token",
-              std::string(login->uses_id_token ? "id_token" : "access_token"));
-  Json& parameters = json_values::member(answer.root(), "parameters");
-  json_values::make_object(parameters);
-  for (const auto& [name, value] : login->parameters) write_field(parameters, name.c_str(), value);
-  write_field(answer.root(), "tokens", app.logins.tokens != nullptr);
+  json_values::write_field(answer.root(), "tokens", app.logins.tokens != nullptr);
+  Json& place = json_values::member(answer.root(), "provider");
+  if (login) write_provider(place, *login);
   response.set_header("Cache-Control", "no-store");
   response.set_body(dump(answer.root()), "application/json");
 }

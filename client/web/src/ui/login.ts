@@ -1,7 +1,7 @@
 // Logs a person in at the server's login provider: OpenID Connect, authorization code with PKCE (RFC 7636). The page goes
 // to the provider and comes back with a code, which it exchanges for a token.
 import { ApiError, jsonOf } from '../api/problem';
-import type { Login } from '../api/types';
+import type { Login, LoginProvider } from '../api/types';
 import { client, token } from '../client';
 
 const key = 'isomesh.login';
@@ -9,17 +9,16 @@ const failed = 'The login failed';
 
 // What the page remembers while the person is at the provider.
 interface Begun {
-  login: Login;
+  provider: LoginProvider;
   state: string;
   nonce: string;
   verifier: string;
   hash: string;
 }
 
-// Null if the server has no login provider for the page.
-export async function findLogin(): Promise<Login | null> {
+export async function findLogin(): Promise<Login> {
   const { status, text, headers } = await client.connection.ask('/login', { retrySeconds: 0 });
-  return status === 404 ? null : (jsonOf(status, text, headers) as Login);
+  return jsonOf(status, text, headers) as Login;
 }
 
 function base64url(bytes: Uint8Array): string {
@@ -35,17 +34,17 @@ function ownAddress(): string {
 }
 
 // Leaves the page.
-export async function beginLogin(login: Login): Promise<void> {
+export async function beginLogin(provider: LoginProvider): Promise<void> {
   if (!window.isSecureContext) throw new ApiError(-1, failed, 'Browsers allow a login only if the page was loaded with https.');
-  const begun: Begun = { login, state: randomText(), nonce: randomText(), verifier: randomText(), hash: window.location.hash };
+  const begun: Begun = { provider, state: randomText(), nonce: randomText(), verifier: randomText(), hash: window.location.hash };
   const digest = await crypto.subtle.digest('SHA-256', new TextEncoder().encode(begun.verifier));
   sessionStorage.setItem(key, JSON.stringify(begun));
-  const address = new URL(login.authorization_endpoint);
+  const address = new URL(provider.authorization_endpoint);
   const parameters = {
     scope: 'openid',
-    ...login.parameters,
+    ...provider.parameters,
     response_type: 'code',
-    client_id: login.client_id,
+    client_id: provider.client_id,
     redirect_uri: ownAddress(),
     state: begun.state,
     nonce: begun.nonce,
@@ -75,7 +74,7 @@ export async function finishLogin(): Promise<void> {
     throw new ApiError(-1, failed, 'This tab has not begun this login. Log in again.');
   }
   // A provider may say who it is (RFC 9207).
-  if (answer.has('iss') && answer.get('iss') !== begun.login.issuer) {
+  if (answer.has('iss') && answer.get('iss') !== begun.provider.issuer) {
     throw new ApiError(-1, failed, 'Another provider has answered. Log in again.');
   }
   const code = answer.get('code');
@@ -84,20 +83,20 @@ export async function finishLogin(): Promise<void> {
 }
 
 // The provider's tokens for the code.
-async function exchanged(code: string, { login, verifier }: Begun): Promise<Record<string, unknown>> {
+async function exchanged(code: string, { provider, verifier }: Begun): Promise<Record<string, unknown>> {
   const body = new URLSearchParams({
-    ...login.parameters,
+    ...provider.parameters,
     grant_type: 'authorization_code',
     code,
     redirect_uri: ownAddress(),
-    client_id: login.client_id,
+    client_id: provider.client_id,
     code_verifier: verifier,
   });
   let response: Response;
   try {
-    response = await fetch(login.token_endpoint, { method: 'POST', body, credentials: 'omit', redirect: 'error' });
+    response = await fetch(provider.token_endpoint, { method: 'POST', body, credentials: 'omit', redirect: 'error' });
   } catch {
-    throw new ApiError(-1, failed, `The login provider at ${new URL(login.token_endpoint).origin} did not respond, or does not allow requests of this page (CORS).`);
+    throw new ApiError(-1, failed, `The login provider at ${new URL(provider.token_endpoint).origin} did not respond, or does not allow requests of this page (CORS).`);
   }
   const tokens: unknown = await response.json().catch(() => null);
   if (!response.ok || typeof tokens !== 'object' || tokens === null) {
@@ -118,12 +117,12 @@ function claimsOf(text: unknown): Record<string, unknown> {
 }
 
 // The token to send, if the login is the one that this page began.
-function tokenIn(tokens: Record<string, unknown>, { login, nonce }: Begun): string {
+function tokenIn(tokens: Record<string, unknown>, { provider, nonce }: Begun): string {
   const { nonce: told, iss, aud } = claimsOf(tokens.id_token);
-  if (told !== nonce || iss !== login.issuer || ![aud].flat().includes(login.client_id)) {
+  if (told !== nonce || iss !== provider.issuer || ![aud].flat().includes(provider.client_id)) {
     throw new ApiError(-1, failed, 'The answer of the login provider is for another login. Log in again.');
   }
-  const value = tokens[login.token];
+  const value = tokens[provider.token];
   if (typeof value !== 'string' || value === '') throw new ApiError(-1, failed, 'The login provider gave no token for this server.');
   return value;
 }

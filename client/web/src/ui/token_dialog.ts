@@ -1,4 +1,4 @@
-import type { Login } from '../api/types';
+import type { LoginProvider } from '../api/types';
 import { token, unauthorized } from '../client';
 import { asApiError } from '../api/problem';
 import { button, field, h } from './dom';
@@ -11,7 +11,7 @@ const isDeclined = new Signal<boolean>(false);
 
 // What the dialog offers.
 interface Ways {
-  login: Login | null;
+  provider: LoginProvider | null;
   hasTokens: boolean;
   // Why there may be no login now.
   trouble: string;
@@ -19,16 +19,16 @@ interface Ways {
 
 async function findWays(): Promise<Ways> {
   try {
-    const login = await findLogin();
-    return { login, hasTokens: login?.tokens ?? true, trouble: '' };
+    const { provider, tokens } = await findLogin();
+    return { provider, hasTokens: tokens || !provider, trouble: '' };
   } catch (error) {
-    return { login: null, hasTokens: true, trouble: asApiError(error).detail };
+    return { provider: null, hasTokens: true, trouble: asApiError(error).detail };
   }
 }
 
-function dialogTexts({ login }: Ways): [title: string, text: string] {
+function dialogTexts({ provider }: Ways): [title: string, text: string] {
   const isFirst = token.value === '';
-  if (login) {
+  if (provider) {
     const text = isFirst ? 'You continue here after the login.' : 'Your login has expired, or this server does not accept it.';
     return ['This server requires a login', text];
   }
@@ -38,9 +38,9 @@ function dialogTexts({ login }: Ways): [title: string, text: string] {
   return ['This server requires a token', text];
 }
 
-function loginButton(login: Login): HTMLButtonElement {
+function loginButton(provider: LoginProvider): HTMLButtonElement {
   const go = (): void => {
-    beginLogin(login).catch(tellError);
+    beginLogin(provider).catch(tellError);
   };
   return button('Log in', go, { class: 'primary', autofocus: true });
 }
@@ -50,18 +50,18 @@ export function watchToken(onToken: () => void): void {
   let dialog: HTMLDialogElement | null = null;
   let isOpening = false;
   const open = (ways: Ways): void => {
-    const { login, hasTokens, trouble } = ways;
+    const { provider, hasTokens, trouble } = ways;
     const [title, text] = dialogTexts(ways);
     const input = h('input', { type: 'password', autocomplete: 'off', required: true, name: 'token' });
     const form = h('form', { method: 'dialog' }, [
       field('Token', input),
-      h('div.actions', h(login ? 'button' : 'button.primary', { type: 'submit' }, 'Continue')),
+      h('div.actions', h(provider ? 'button' : 'button.primary', { type: 'submit' }, 'Continue')),
     ]);
-    const made = h('dialog.dialog', { 'aria-label': login ? 'Login' : 'Token' }, [
+    const made = h('dialog.dialog', { 'aria-label': provider ? 'Login' : 'Token' }, [
       h('h2', title),
       h('p', text),
-      trouble !== '' && h('p', `Nobody can log in at the moment: ${trouble}.`),
-      login && h('div.actions', loginButton(login)),
+      trouble !== '' && h('p', trouble),
+      provider && h('div.actions', loginButton(provider)),
       hasTokens && form,
     ]);
     dialog = made;
@@ -87,7 +87,7 @@ export function watchToken(onToken: () => void): void {
     });
     document.body.append(made);
     made.showModal();
-    if (!login) input.focus();
+    if (!provider) input.focus();
   };
   const findAndOpen = async (): Promise<void> => {
     if (dialog || isOpening) return;

@@ -254,11 +254,11 @@ TEST_F(LoginTest, ThePageLearnsHowToLogIn) {
   const test::Answer login = get("/login");
   EXPECT_EQ(login.status, 200);
   EXPECT_EQ(login.body,
-            R"({"issuer":")" + peer_.issuer() +
+            R"({"tokens":false,"provider":{"issuer":")" + peer_.issuer() +
                 R"(","client_id":"page","authorization_endpoint":")" + peer_.issuer() +
                 R"(/authorize","token_endpoint":")" + peer_.issuer() +
                 R"(/token","token":"access_token","parameters":{"scope":"openid profile",)"
-                R"("resource":"https://isomesh.example/?a=b"},"tokens":false})");
+                R"("resource":"https://isomesh.example/?a=b"}}})");
   EXPECT_THAT(get("/").header("content-security-policy"),
               HasSubstr("connect-src 'self' " + peer_.issuer() + ';'));
 }
@@ -282,7 +282,7 @@ class PlainLoginTest : public LoginTest {
 };
 
 TEST_F(PlainLoginTest, ThePageHasNoneWithoutAClient) {
-  EXPECT_EQ(get("/login").status, 404);
+  EXPECT_EQ(get("/login").body, R"({"tokens":false,"provider":null})");
   EXPECT_THAT(get("/").header("content-security-policy"), HasSubstr("connect-src 'self';"));
 }
 

@@ -207,8 +207,9 @@ TEST(WebToken, HasOneMeaning) {
                                      std::string(1000, ']') + ", " + inner + '}')),
               HasSubstr("too deep"));
   for (const std::string& text :
-       {claims + claims, std::string("[]"), std::string("1"), std::string(),
-        claims.substr(0, claims.size() - 1), std::string("{\"a\": \"\xff\"}")}) {
+       {claims + claims, claims + std::string(1, '\0') + "more", std::string("[]"),
+        std::string("1"), std::string(), claims.substr(0, claims.size() - 1),
+        std::string("{\"a\": \"\xff\"}")}) {
     EXPECT_THAT(refusal_of(with_claims(text)), HasSubstr("no JSON object")) << text;
   }
 }
