@@ -1,14 +1,14 @@
 """isomesh turns medical volumes into surface meshes. This package is the client of its server.
 
-    import isomesh
+    import isomesh_client
 
-    client = isomesh.Client("http://127.0.0.1:8080")
+    client = isomesh_client.Client("http://127.0.0.1:8080")
     mesh = client.mesh("head.nii.gz", iso=60)
     mesh.vertices  # (n, 3), millimetres, LPS
     mesh.faces     # (m, 3)
 
 The package needs the standard library only. With numpy, meshes are numpy arrays, and arrays can be
-uploaded. `isomesh.api` has the types of the server's requests and responses.
+uploaded. `isomesh_client.api` has the types of the server's requests and responses.
 """
 
 from . import api

@@ -106,7 +106,7 @@ class Client:
         progress  a function that is called with the job about once a second
 
         `affine` to `modality` are as for `upload`. All other keywords are parameters of the job;
-        `help(isomesh.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
+        `help(isomesh_client.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
         besides `.ply`.
 
         Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The volume's
@@ -248,7 +248,7 @@ class Client:
     ) -> api.Job:
         """Starts a job and returns at once: `client.submit(volume, iso=60, formats=["glb", "stl"])`.
 
-        The keywords are parameters of the job; `help(isomesh.api.JobOptions)` describes them. The same
+        The keywords are parameters of the job; `help(isomesh_client.api.JobOptions)` describes them. The same
         `idempotency_key` always returns the same job, also in another process.
         """
         return self._submit(volume, idempotency_key, given(locals()))
