@@ -90,6 +90,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/hospital/command", {"client/cli", "server/hospital/client"}},
     {"client", {"server/hospital/command"}},
     {"client/verify", {"client/isomesh", "server/import/message"}},
+    {"client/kernels", {"server/jobs/making", "server/import/source"}},
 };
 
 // The layer that a folder is, or is a part of; empty for a folder that is in none.
