@@ -52,6 +52,7 @@ void answer_file(const Request& request, Response& response) {
 void add_page_routes(App& app) {
   add_get(app, "/", answer_file);
   add_get(app, "/assets/{file}", answer_file);
+  add_get(app, "/client.js", answer_file);
 }
 
 }  // namespace isomesh::http
