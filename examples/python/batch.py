@@ -13,7 +13,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import isomesh
+import isomesh_client
 
 
 def main() -> int:
@@ -24,7 +24,7 @@ def main() -> int:
     parser.add_argument("--server", help="default: $ISOMESH_SERVER, or http://127.0.0.1:8080")
     arguments = parser.parse_args()
 
-    client = isomesh.Client(arguments.server)
+    client = isomesh_client.Client(arguments.server)
     if not arguments.scans.is_dir():
         parser.error(f"there is no folder {arguments.scans}")
     arguments.meshes.mkdir(parents=True, exist_ok=True)
@@ -45,7 +45,7 @@ def main() -> int:
         for scan, result in [(scan, pool.submit(mesh, scan)) for scan in scans]:
             try:
                 found = result.result()
-            except isomesh.IsomeshError as error:
+            except isomesh_client.IsomeshError as error:
                 failed += 1
                 print(f"{scan}: {error}", file=sys.stderr)
                 continue

@@ -110,7 +110,8 @@ bool can_be_walked(const MeshParameters& parameters, bool certify) {
   const bool is_whole = parameters.labels || certify || parameters.max_error_mm ||
                         parameters.triangles || parameters.untangle || parameters.fill_cavities ||
                         !parameters.components.keeps_all();
-  return !is_whole && mesh::can_walk(smooth_options(parameters)) &&
+  // Without files, the caller wants the mesh itself.
+  return !is_whole && !parameters.formats.empty() && mesh::can_walk(smooth_options(parameters)) &&
          std::ranges::all_of(files_of(parameters), [&](MeshFormat format) {
            return codec::is_walked(format, parameters);
          });

@@ -5,10 +5,8 @@ import {
   Box3,
   BufferAttribute,
   BufferGeometry,
-  DoubleSide,
-  FrontSide,
   Mesh,
-  MeshPhongMaterial,
+  type MeshPhongMaterial,
   type Object3D,
   type Plane,
   Sphere,
@@ -18,14 +16,15 @@ import {
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
 import type { Coarse } from '../mesh/coarse';
-import type { CoarseAnswer } from '../mesh/coarse.worker';
 import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
+import { labelMaterials, material, neutral } from './materials';
 import { firstMet, type Interval } from './pick';
 import { placeholder } from './placeholder';
 import { defaultStyle, type SurfaceStyle } from './style';
 import type { Uploading } from './uploading';
+import { Wires, type Wire } from './wires';
 
 export interface Hit {
   at: number; // along the ray
@@ -45,6 +44,7 @@ interface Look {
   level: { seams: Seams; blocks: number };
   // A coarse copy of all its blocks, drawn while it moves. Its meshes are as those of a block.
   copy: Drawn[];
+  copyWire: Wire;
   showsDistance: boolean;
   opacity: number;
 }
@@ -55,6 +55,8 @@ interface DrawnBlock {
   // One mesh; of a label two, for its front and for its back.
   meshes: Drawn[];
   geometry: BufferGeometry;
+  // Its edges, once they are seen.
+  wire: Wire | null;
   look: Look;
   label: Label | null;
   isLevel: boolean;
@@ -64,12 +66,7 @@ interface DrawnBlock {
   isThere: boolean; // at the graphics processor
 }
 
-const neutral = '#dcd6c8';
 const wiresPerFrame = 4;
-
-function material(colour: string): MeshPhongMaterial {
-  return new MeshPhongMaterial({ color: colour, specular: 0x1c1c1c, shininess: 24, side: DoubleSide });
-}
 
 function geometryOf({ positions, normals, distances }: Omit<Coarse, 'index'>, index: Uint16Array | Uint32Array): BufferGeometry {
   const made = new BufferGeometry();
@@ -78,19 +75,6 @@ function geometryOf({ positions, normals, distances }: Omit<Coarse, 'index'>, in
   if (distances) made.setAttribute('distanceMm', new BufferAttribute(distances, 1));
   made.setIndex(new BufferAttribute(index, 1));
   return made;
-}
-
-// The wall that two labels share is there for each of them, and seen from inside of one it is the other's
-// front. Backs lie a little farther away, so that the two do not fight for the same depth.
-function labelMaterials(colour: string): MeshPhongMaterial[] {
-  const front = material(colour);
-  const back = material(colour);
-  front.side = FrontSide;
-  back.side = BackSide;
-  back.polygonOffset = true;
-  back.polygonOffsetFactor = 1;
-  back.polygonOffsetUnits = 1;
-  return [front, back];
 }
 
 export class Parts {
@@ -108,6 +92,7 @@ export class Parts {
   private isCoarse = false;
   private isWhole = false;
   private readonly shader = new DistanceShader();
+  private readonly wires = new Wires();
   // What a surface without labels is drawn with, so that its shader is there before its first block.
   private readonly usual = material(neutral);
   private readonly probe = new Mesh(placeholder(), this.usual);
@@ -118,7 +103,7 @@ export class Parts {
     private readonly draw: () => void,
   ) {
     this.probe.visible = false;
-    scene.add(this.probe);
+    scene.add(this.probe, this.wires.probe);
   }
 
   // Whether they are drawn with shaders that may not be there.
@@ -134,7 +119,7 @@ export class Parts {
       const meshes = look.materials.map((made) => new Mesh(geometry, made));
       const owner = isLevel ? look.level : look;
       const member = owner.blocks;
-      const drawn: DrawnBlock = { meshes, geometry, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
+      const drawn: DrawnBlock = { meshes, geometry, wire: null, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
       this.uploading.add({
         geometries: [geometry],
         onThere: () => {
@@ -194,6 +179,7 @@ export class Parts {
   // What is on the other side of these planes is not seen.
   setCut(planes: Plane[] | null): boolean {
     this.planes = planes;
+    this.wires.setCut(planes);
     const isOther = this.applyAll();
     this.showAll();
     return isOther;
@@ -231,8 +217,11 @@ export class Parts {
   }
 
   // Coarse copies of its surfaces, by their numbers; in place of those before.
-  takeCopies(levels: CoarseAnswer): void {
-    for (const { geometry } of this.copies.flat()) geometry.dispose();
+  takeCopies(levels: readonly (readonly Coarse[])[]): void {
+    for (const { geometry } of this.copies.flat()) {
+      this.wires.forget(geometry);
+      geometry.dispose();
+    }
     this.copies = levels.map((surfaces) =>
       surfaces.map((made) => ({ geometry: geometryOf(made, made.index), triangles: made.index.length / 3 })),
     );
@@ -240,6 +229,7 @@ export class Parts {
       if (look.copy.length > 0) continue;
       look.copy = look.materials.map((made) => new Mesh(placeholder(), made));
       this.place(look.copy);
+      this.scene.add(look.copyWire);
     }
     this.setLevel(this.level);
   }
@@ -270,7 +260,7 @@ export class Parts {
     const share = this.blocks.length / steps;
     this.blocks.forEach((block, at) => {
       if (step === null || Math.floor(at / share) === step) this.show(block);
-      else for (const mesh of block.meshes) mesh.visible = false;
+      else this.hide(block);
     });
   }
 
@@ -323,6 +313,7 @@ export class Parts {
     for (const { materials } of this.looks.values()) for (const made of materials) made.dispose();
     this.usual.dispose();
     this.shader.dispose();
+    this.wires.dispose();
   }
 
   private newLook(part: Part | null): Look {
@@ -334,6 +325,7 @@ export class Parts {
       blocks: 0,
       level: { seams: new Seams(), blocks: 0 },
       copy: [],
+      copyWire: this.wires.add(),
       showsDistance: false,
       opacity: part ? (this.opacities.get(part.label) ?? 1) : 1,
     };
@@ -365,7 +357,8 @@ export class Parts {
       if (isOther) made.needsUpdate = true;
       hasChanged ||= isOther;
       made.flatShading = shading === 'flat';
-      made.wireframe = wireframe;
+      // Edges lie on the surface.
+      made.polygonOffset = wireframe || made.side === BackSide;
       made.opacity = opacity;
       made.transparent = opacity < 1;
       made.depthWrite = opacity === 1;
@@ -382,14 +375,30 @@ export class Parts {
   }
 
   private show(block: DrawnBlock): void {
-    this.showMeshes(block.meshes, block.look, this.isSeen(block));
+    const isSeen = this.isSeen(block);
+    this.showMeshes(block.meshes, block.look, isSeen);
+    if (isSeen && this.style.wireframe && !block.wire) {
+      block.wire = this.wires.add();
+      this.scene.add(block.wire);
+    }
+    if (block.wire) this.showWire(block.wire, block.geometry, block.made.border, isSeen);
+  }
+
+  private showWire(wire: Wire, geometry: BufferGeometry, border: ArrayLike<number>, isSeen: boolean): void {
+    wire.visible = isSeen && this.style.wireframe;
+    if (wire.visible) wire.geometry = this.wires.of(geometry, border);
+  }
+
+  private hide({ meshes, wire }: DrawnBlock): void {
+    for (const mesh of meshes) mesh.visible = false;
+    if (wire) wire.visible = false;
   }
 
   // The back of a closed surface is only seen where it is cut or looked through.
   private showMeshes([front, back]: readonly Drawn[], { opacity }: Look, isSeen: boolean): void {
     if (front) front.visible = isSeen;
     const isThrough = this.style.opacity * opacity < 1;
-    if (back) back.visible = isSeen && (this.planes !== null || isThrough || this.style.wireframe);
+    if (back) back.visible = isSeen && (this.planes !== null || isThrough);
   }
 
   private get isCopySeen(): boolean {
@@ -404,12 +413,17 @@ export class Parts {
 
   private showAll(): void {
     for (const block of this.blocks) this.show(block);
-    for (const look of this.looks.values()) this.showMeshes(look.copy, look, look.isShown && this.isCopySeen);
+    for (const look of this.looks.values()) {
+      const isSeen = look.isShown && this.isCopySeen;
+      this.showMeshes(look.copy, look, isSeen);
+      const geometry = look.copy[0]?.geometry;
+      if (geometry) this.showWire(look.copyWire, geometry, { length: 0 }, isSeen);
+    }
   }
 
-  // Wires are made of a block when it is first drawn with them, so that some blocks at a time turn.
+  // Wires are made of a block when it is first drawn with them, so that some blocks at a time get them.
   private showBySteps(): void {
-    for (const { meshes } of this.blocks) for (const mesh of meshes) mesh.visible = false;
+    for (const { wire } of this.blocks) if (wire) wire.visible = false;
     const step = (from: number): void => {
       for (const block of this.blocks.slice(from, from + wiresPerFrame)) this.show(block);
       this.draw();

@@ -33,8 +33,10 @@ export class Surface {
   private readonly cross: Cross;
   private readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
-  // More blocks can be drawn.
+  // A frame shows more blocks.
   onShown: (() => void) | null = null;
+  // How many triangles of its finest blocks the last frame shows.
+  trianglesShown = 0;
   // A click or tap; null where nothing is.
   onPick: ((picked: Picked | null) => void) | null = null;
 
@@ -143,7 +145,7 @@ export class Surface {
 
   addBlocks(blocks: Block[], part: Part | null, isCoarse = false): void {
     if (this.parts.add(blocks, part, isCoarse)) this.compile();
-    if (!isCoarse) for (const { coarse } of blocks) this.copies.add(this.parts.numberOf(part?.label ?? null), coarse);
+    if (!isCoarse) for (const block of blocks) this.copies.add(this.parts.numberOf(part?.label ?? null), block);
     delete this.host.dataset.still;
     this.bring();
   }
@@ -154,7 +156,6 @@ export class Surface {
     this.isBusy = true;
     this.isStale = true;
     this.uploading.step(this.camera);
-    this.onShown?.();
     whenDrawn(this.renderer.getContext() as WebGL2RenderingContext, () => this.release(() => this.budget.soon(() => this.draw())));
   }
 
@@ -173,11 +174,6 @@ export class Surface {
     this.parts.finish();
     this.copies.finish();
     joinSeams(this.parts, this.over.signal, () => this.draw());
-  }
-
-  // How many triangles of its finest blocks are drawn.
-  get trianglesShown(): number {
-    return this.parts.trianglesThere;
   }
 
   // Resolves once all blocks that were added are drawn.
@@ -347,6 +343,7 @@ export class Surface {
     this.isStale = false;
     const began = performance.now();
     const { isCoarse } = this;
+    const there = this.parts.trianglesThere;
     const isNext = this.wasWaiting;
     this.wasWaiting = false;
     const { clientWidth: width, clientHeight: height } = this.host;
@@ -359,12 +356,14 @@ export class Surface {
     this.frame.paint(manner, isOver, after, (isWhole) => {
       // Before the next one begins.
       if (isWhole && !this.isDisposed) this.budget.drawn({ began, isMoving: this.isMoving, isCoarse, isNext });
-      this.release(() => isWhole && this.drawn());
+      this.release(() => isWhole && this.drawn(there));
     });
   }
 
-  private drawn(): void {
+  private drawn(triangles: number): void {
     const { isMoving, budget } = this;
+    if (!this.isCoarse) this.trianglesShown = triangles;
+    this.onShown?.();
     if (budget.isSlow) this.copies.want();
     if (isMoving && budget.isSlow) this.setCoarse(true);
     if (this.isCoarse) this.parts.setLevel(this.levels.indexOf(budget.effort.triangles));

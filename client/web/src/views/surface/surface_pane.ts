@@ -298,7 +298,7 @@ export class SurfacePane {
       ]),
       h('div.tool-group', [
         this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
-        this.toggle('wireframe', 'Edges', 'Wireframe: show only the edges (w)', () => this.toggleWires()),
+        this.toggle('wireframe', 'Edges', 'Show the edges of the triangles (w)', () => this.toggleWires()),
         distance.toggle,
         h('label.opacity', h('span', 'Opacity'), opacity),
       ]),

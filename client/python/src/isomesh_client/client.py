@@ -9,10 +9,11 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union, cast
 from urllib.parse import quote, urlencode
 
 from . import answers, busy, ply, uploads
+from .batches import Batches
 from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
 from .exchange import Exchange
 from .files import FINAL_STATES, Arriving, file_of, format_of, written
@@ -33,7 +34,7 @@ _SHORTEST_LOOK = 0.2
 _LOOKS_LIKE_LABELS = "looks-like-labels"
 
 
-class Client:
+class Client(Batches):
     """A client of one server. It is constant after construction: several threads may share it.
 
     server       http://HOST:PORT, https://HOST:PORT or unix:PATH. Default: ISOMESH_SERVER of the
@@ -66,6 +67,9 @@ class Client:
         token = token if token is not None else environment("ISOMESH_TOKEN", "")
         authorities = authorities or environment("ISOMESH_CA") or None
         self._exchange = Exchange(Transport(self.server, token, authorities, timeout, retry_seconds))
+
+    def __repr__(self) -> str:
+        return f"<Client of {self.server}>"
 
     @by_keywords
     def mesh(
@@ -106,7 +110,7 @@ class Client:
         progress  a function that is called with the job about once a second
 
         `affine` to `modality` are as for `upload`. All other keywords are parameters of the job;
-        `help(isomesh.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
+        `help(isomesh_client.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
         besides `.ply`.
 
         Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The volume's
@@ -118,25 +122,9 @@ class Client:
         of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(each, keywords[each])}
         if affine_space != "ras":
             of_upload["affine_space"] = affine_space
-        stored = self._stored(source, of_upload)
-        if stored is None:
-            stored = self._upload_one(source, "labels" in parameters, of_upload)
         formats = parameters.get("formats", [])
         parameters["formats"] = formats if "ply" in formats else [*formats, "ply"]
-        key = uuid.uuid4().hex
-        try:
-            done = self.wait(self._submit(stored, key, parameters), progress=progress)
-        except IsomeshError:
-            raise
-        except BaseException:  # an interrupt, or an exception of `progress`
-            with contextlib.suppress(Exception):
-                # The key finds the job even if its response was interrupted.
-                parting = copy.copy(self)
-                parting._exchange = self._exchange.within(busy.PARTING_SECONDS)
-                parting.cancel(parting._submit(stored, key, parameters))
-            raise
-        if done["mesh"]["empty"]:
-            warn(f"the surface is empty: {why_empty(done, stored)}")
+        stored, done = self._made(source, of_upload, parameters, progress)
         return self._fetch(done, stored["notes"])
 
     # --- Volumes ---------------------------------------------------------------------------------
@@ -248,7 +236,7 @@ class Client:
     ) -> api.Job:
         """Starts a job and returns at once: `client.submit(volume, iso=60, formats=["glb", "stl"])`.
 
-        The keywords are parameters of the job; `help(isomesh.api.JobOptions)` describes them. The same
+        The keywords are parameters of the job; `help(isomesh_client.api.JobOptions)` describes them. The same
         `idempotency_key` always returns the same job, also in another process.
         """
         return self._submit(volume, idempotency_key, given(locals()))
@@ -306,17 +294,17 @@ class Client:
             # A server that responds at once does not make this a busy loop.
             time.sleep(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
 
-    def job_labels(self, job: Union[str, AnyJob]) -> Iterator[api.LabelSummary]:
+    def job_labels(self, job: Union[str, AnyJob]) -> List[api.LabelSummary]:
         """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
         number, `job["mesh"]["labels_count"]`."""
         pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
-        return cast("Iterator[api.LabelSummary]", pages)
+        return cast("List[api.LabelSummary]", list(pages))
 
-    def job_walls(self, job: Union[str, AnyJob]) -> Iterator[api.WallSummary]:
+    def job_walls(self, job: Union[str, AnyJob]) -> List[api.WallSummary]:
         """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None.
         In ascending order of labels."""
         pages = self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, {})
-        return cast("Iterator[api.WallSummary]", pages)
+        return cast("List[api.WallSummary]", list(pages))
 
     def report(self, job: Union[str, AnyJob]) -> api.JobReport:
         """What a succeeded job made, of what and how: to keep beside its mesh."""
@@ -393,6 +381,29 @@ class Client:
         return target
 
     # --- How -------------------------------------------------------------------------------------
+
+    def _made(
+        self, source: Any, of_upload: Mapping[str, Any], parameters: Mapping[str, Any], progress: Optional[Progress]
+    ) -> Tuple[api.Volume, api.SucceededJob]:
+        """The volume of a source, which is uploaded if needed, and its job, which has succeeded."""
+        stored = self._stored(source, of_upload)
+        if stored is None:
+            stored = self._upload_one(source, "labels" in parameters, of_upload)
+        key = uuid.uuid4().hex
+        try:
+            done = self.wait(self._submit(stored, key, parameters), progress=progress)
+        except IsomeshError:
+            raise
+        except BaseException:  # an interrupt, or an exception of `progress`
+            with contextlib.suppress(Exception):
+                # The key finds the job even if its response was interrupted.
+                parting = copy.copy(self)
+                parting._exchange = self._exchange.within(busy.PARTING_SECONDS)
+                parting.cancel(parting._submit(stored, key, parameters))
+            raise
+        if done["mesh"]["empty"]:
+            warn(f"the surface is empty: {why_empty(done, stored)}")
+        return stored, done
 
     def _stored(self, source: Any, of_upload: Mapping[str, Any]) -> Optional[api.Volume]:
         """The stored volume that `source` names; None for a source to upload."""

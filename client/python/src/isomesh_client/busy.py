@@ -19,7 +19,7 @@ _FIRST_PAUSE = 0.5  # seconds; without Retry-After each pause is twice as long a
 _LONGEST_PAUSE = 15.0
 _LEAST_JITTER = 0.5
 
-_log = logging.getLogger("isomesh")
+_log = logging.getLogger("isomesh_client")
 
 
 def retry_after(value: str, date: str) -> Optional[float]:
