@@ -44,11 +44,12 @@ std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t sampl
          (parameters.regularize ? joining * kJoinedPerVertex : 0);
 }
 
-// The memory of labels beside their walls: the sides of the triangles, the lists of each label's
-// triangles and, at worst, all labels' own surfaces at once. A triangle is in two of them at most.
+// The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,
+// the lists of each label's triangles and, at worst, all labels' own surfaces at once. A triangle
+// is in two of them at most.
 std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
   return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
-         2 * mesh_bytes(surface);
+         surface.vertices * sizeof(mesh::VertexOwner) + 2 * mesh_bytes(surface);
 }
 
 // The memory of untangling, simplifying and certifying, one after the other, beside the rest: the

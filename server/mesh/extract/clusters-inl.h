@@ -329,7 +329,10 @@ class ClusterWalk {
         if (risks != 0) {
           kept = without_clashes(sample, all, risks);
           if ((kept & ~Joined::kFlags) == 0) continue;
-          if (kept != all) facts = links.facts(parity(sample), kept & ~Joined::kFlags);
+          if (kept != all) {
+            kept &= ~Joined::kWhole;
+            facts = links.facts(parity(sample), kept & ~Joined::kFlags);
+          }
         }
         if (facts.components() > 1) kept |= Joined::kSeveral;
         joining.samples |= Word{1} << bit;

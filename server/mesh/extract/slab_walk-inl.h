@@ -129,9 +129,7 @@ class SlabWriter {
     for (std::size_t i = 0; i < vertices_found_; ++i) {
       indices[vertices_[i]] = vertex + static_cast<std::uint32_t>(i);
     }
-    if constexpr (Field::kPlacesVertices) {
-      if (z < slab_.end) place_vertices(y, z, vertex);
-    }
+    if (z < slab_.end) place_vertices(y, z, vertex);
     vertex += static_cast<std::uint32_t>(vertices_found_);
   }
 
@@ -154,7 +152,10 @@ class SlabWriter {
 
   // Places the vertices of the row, the first of which is `vertex`.
   void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
-    if constexpr (Field::kHasLines) mark_lines(vertex);
+    if constexpr (Field::kHasLines) {
+      mark_lines(vertex);
+      field_.tell_owners(y, z, std::span(vertices_).first(vertices_found_), vertex, output_);
+    }
     if (marched_.margin == 0) return place_inner(0, vertices_found_, y, z, vertex);
     std::size_t begin = 0;
     std::size_t end = vertices_found_;
