@@ -88,6 +88,7 @@ void add_page_routes(App& app) {
   };
   add_get(app, "/", answer_with_file);
   add_get(app, "/assets/{file}", answer_with_file);
+  add_get(app, "/client.js", answer_with_file);
   add_get(app, "/login", [&app](const Request& request, Response& response) {
     check_known(request, {});
     answer_login(app, response);

@@ -89,8 +89,10 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"client/cli", {"client/isomesh"}},
     {"server/hospital/client", {"client/isomesh", "server/hospital/protocol"}},
     {"server/hospital/command", {"client/cli", "server/hospital/client"}},
-    {"client", {"server/hospital/command"}},
+    {"client/mcp", {"client/cli"}},
+    {"client", {"server/hospital/command", "client/mcp"}},
     {"client/verify", {"client/isomesh", "server/import/message"}},
+    {"client/kernels", {"server/jobs/making", "server/import/source"}},
 };
 
 // The layer that a folder is, or is a part of; empty for a folder that is in none.
