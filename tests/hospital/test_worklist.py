@@ -1,5 +1,6 @@
 """Workitems of a worklist (UPS-RS) become orders: claimed once, told of their progress and end."""
 import random
+import time
 
 import peers
 import worklist
@@ -88,6 +89,7 @@ class Workitems(Loop):
         daemon = self.performer()
         for _ in range(3):
             peers.until(lambda: len(self.orders(daemon)) == 2)
+            time.sleep(chance.uniform(0, 1))
             daemon.kill()
             daemon.start()
         self.list.fault = lambda method, path: None
