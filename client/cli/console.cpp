@@ -10,6 +10,7 @@
 #include "client/cli/option_groups.h"
 #include "client/cli/report.h"
 #include "client/cli/text.h"
+#include "proto/notes.h"
 
 namespace isomesh::cli {
 namespace {
@@ -67,8 +68,12 @@ void suggest_local() {
   complain("check --server, start isomeshd, or use `isomesh local`, which needs no server");
 }
 
-void tell_notes(const Volume& volume, const std::string& subject) {
+void tell_notes(const Volume& volume, const Options& options, const std::string& subject) {
+  if (options.quiet) return;
   for (const Note& note : volume.notes) {
+    // It advises --labels, which is given.
+    const bool is_followed = note.code == describe(NoteCode::kLooksLikeLabels).name;
+    if (is_followed && options.parameters.labels) continue;
     complain((subject.empty() ? "" : subject + ": ") + "note: " + with_options(note.detail) + " (" +
              note.code + ")");
   }

@@ -208,7 +208,7 @@ int MeshRun::members(const Input& input, std::vector<UploadedVolume> volumes) {
 int MeshRun::stored(const std::string& id, const Input& input) {
   const Task task = task_of(input);
   const Volume found = client_.volume(volume_id(client_, id));
-  if (!options_.quiet) tell_notes(found, task.subject);
+  tell_notes(found, options_, task.subject);
   return mesh(found, task);
 }
 

@@ -97,11 +97,10 @@ std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
   };
   std::vector<UploadedVolume> volumes = client.upload_all(files, watched);
   bar.clear();
-  if (options.quiet) return volumes;
   for (const UploadedVolume& each : volumes) {
     if (!each.volume) continue;
     const bool has_both = !subject.empty() && volumes.size() > 1;
-    tell_notes(*each.volume,
+    tell_notes(*each.volume, options,
                subject + (has_both ? ": " : "") + (volumes.size() > 1 ? each.member : ""));
   }
   return volumes;

@@ -78,6 +78,11 @@ TEST_F(LabelsTest, AMaskAtAnIsoValueIsAdvisedToUseLabels) {
   EXPECT_THAT(made.errors, HasSubstr("note: The samples are a mask: each is 0 or 1."));
   EXPECT_THAT(made.errors, HasSubstr("--labels all"));
   EXPECT_THAT(made.errors, HasSubstr("(looks-like-labels)"));
+
+  const Finished followed = daemon_.command(
+      {"mesh", folder / "mask.nrrd", "--labels", "all", "--close", "-o", folder / "mask.glb"});
+  EXPECT_EQ(followed.status, 0) << followed.errors;
+  EXPECT_EQ(followed.errors.find("looks-like-labels"), std::string::npos) << followed.errors;
 }
 
 TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {

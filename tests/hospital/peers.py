@@ -49,9 +49,9 @@ def until(what, seconds=60, every=0.1):
 class Orthanc:
     """A PACS in a folder of its own."""
 
-    def __init__(self, folder, user=None):
+    def __init__(self, folder, user=None, port=None):
         self.folder = folder
-        self.port = free_port()
+        self.port = port or free_port()
         self.user = user
         os.makedirs(folder, exist_ok=True)
         configuration = {

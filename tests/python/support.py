@@ -10,7 +10,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-import isomesh
+import isomesh_client
 import numpy
 from limits import LimitedTest, limited
 
@@ -44,7 +44,7 @@ class DaemonTest(LimitedTest):
         if not line.startswith("listening on "):
             raise RuntimeError(f"{DAEMON} did not start")
         cls.url = line.split()[-1]
-        cls.client = isomesh.Client(cls.url)
+        cls.client = isomesh_client.Client(cls.url)
 
     @classmethod
     def prepare(cls, folder):

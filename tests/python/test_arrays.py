@@ -6,7 +6,7 @@ import sys
 import unittest
 import warnings
 
-import isomesh
+import isomesh_client
 import nibabel
 import numpy
 from support import DaemonTest, ball, turned
@@ -73,7 +73,7 @@ class Arrays(DaemonTest):
         other[0, 3] += 5000
         image.set_qform(other, code=1)
         image.header.set_xyzt_units("micron")
-        with self.assertWarnsRegex(isomesh.VolumeWarning, r"up to 5\.0 mm apart.*\(forms-differ\)$") as warned:
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, r"up to 5\.0 mm apart.*\(forms-differ\)$") as warned:
             volume = self.client.upload(image)
         self.assertEqual(warned.filename, __file__)
         self.assertAlmostEqual(volume["origin"][0], -turned()[0, 3] / 1000, places=6)
@@ -136,7 +136,7 @@ class Arrays(DaemonTest):
             (ball(), {"spacing": 1}, TypeError, "spacing"),
             (ball(), {"spacing": (1, 2, float("inf"))}, ValueError, "spacing"),
             (b"", {"spacing": "123"}, ValueError, "spacing"),
-            (b"", {"raw": isomesh.Raw((1, 1, 1), "uint8", spacing=(1, 1))}, ValueError, "spacing"),
+            (b"", {"raw": isomesh_client.Raw((1, 1, 1), "uint8", spacing=(1, 1))}, ValueError, "spacing"),
             ("", {}, FileNotFoundError, "empty"),
             ([""], {}, FileNotFoundError, "empty"),
             (b"", {"affine": numpy.eye(4)}, ValueError, "for arrays"),
@@ -170,9 +170,9 @@ class Arrays(DaemonTest):
 
     def test_an_empty_surface_is_an_empty_mesh(self):
         range_of = r"the iso-value 5 is outside the samples' range, -\d+\.?\d* to -0\.8"
-        with self.assertWarnsRegex(isomesh.VolumeWarning, "the surface is empty: " + range_of):
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "the surface is empty: " + range_of):
             mesh = self.client.mesh(ball(), iso=5)
-        with self.assertWarnsRegex(isomesh.VolumeWarning, "the surface is empty: no connected component was kept"):
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "the surface is empty: no connected component was kept"):
             self.client.mesh(ball(), iso=-8, components={"min_triangles": 10**8})
         self.assertEqual(mesh.vertices.shape, (0, 3))
         self.assertEqual(mesh.in_space("ras").faces.shape, (0, 3))
@@ -183,10 +183,10 @@ class Arrays(DaemonTest):
         script = """
 import sys
 sys.modules["numpy"] = None
-import isomesh, json
-mesh = isomesh.read_ply(sys.argv[1])
+import isomesh_client, json
+mesh = isomesh_client.read_ply(sys.argv[1])
 ras = mesh.in_space("ras")
-empty = isomesh.Client(sys.argv[2]).mesh(sys.argv[3], iso=1000)
+empty = isomesh_client.Client(sys.argv[2]).mesh(sys.argv[3], iso=1000)
 bounds = [mesh.bounds.tolist(), empty.bounds.tolist()]
 mesh.save(sys.argv[4])
 try:
@@ -212,7 +212,7 @@ print(json.dumps([mesh.vertices.tolist(), ras.vertices.tolist(), mesh.faces.toli
     def test_a_damaged_ply_is_refused(self):
         path = self.client.download(self.client.mesh(ball(), iso=-8).job, self.folder / "whole.ply")
         whole = path.read_bytes()
-        self.assertGreater(len(isomesh.read_ply(whole).faces), 100)
+        self.assertGreater(len(isomesh_client.read_ply(whole).faces), 100)
         begin = whole.index(b"end_header\n") + 11
         for damaged in (
             whole[:-1],
@@ -224,8 +224,8 @@ print(json.dumps([mesh.vertices.tolist(), ras.vertices.tolist(), mesh.faces.toli
             whole[:-13] + b"\4" + whole[-12:],
             whole[:begin],
         ):
-            with self.assertRaises(isomesh.WrongAnswer):
-                isomesh.read_ply(damaged)
+            with self.assertRaises(isomesh_client.WrongAnswer):
+                isomesh_client.read_ply(damaged)
 
 
 if __name__ == "__main__":

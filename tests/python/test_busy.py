@@ -7,9 +7,9 @@ import unittest
 from collections import Counter
 from unittest import mock
 
-import isomesh
+import isomesh_client
 import numpy
-from isomesh import busy
+from isomesh_client import busy
 from limits import LimitedTest
 from support import DaemonTest, FakeServer, ball
 
@@ -91,15 +91,15 @@ class RetryAfter(LimitedTest):
             clock = Clock()
             with clock.installed():
                 for _ in range(200):
-                    busy.Patience(100).wait(isomesh.Refused(503, {}, asked))
+                    busy.Patience(100).wait(isomesh_client.Refused(503, {}, asked))
             self.assertTrue(all(asked <= pause <= latest for pause in clock.pauses))
             self.assertGreater(max(clock.pauses) - min(clock.pauses), (latest - asked) / 2)
 
     def test_pauses_grow_if_the_server_does_not_say(self):
         clock, patience = Clock(), busy.Patience(600)
-        with clock.installed(), self.assertRaises(isomesh.Refused):
+        with clock.installed(), self.assertRaises(isomesh_client.Refused):
             for _ in range(NEVER):
-                patience.wait(isomesh.Refused(429, {}))
+                patience.wait(isomesh_client.Refused(429, {}))
         for pause, longest in zip(clock.pauses, (0.5, 1, 2, 4, 8, 15, 15, 15)):
             self.assertTrue(longest / 2 <= pause <= longest, clock.pauses)
         self.assertTrue(570 < sum(clock.pauses) <= 600, clock.pauses)
@@ -107,8 +107,8 @@ class RetryAfter(LimitedTest):
 
 class Limits(LimitedTest):
     def assert_rejected(self, server, clock, **options):
-        with clock.installed(), self.assertRaises(isomesh.Refused) as caught:
-            isomesh.Client(server.url, **options).job("7")
+        with clock.installed(), self.assertRaises(isomesh_client.Refused) as caught:
+            isomesh_client.Client(server.url, **options).job("7")
         return caught.exception
 
     def test_it_waits_for_ten_minutes(self):
@@ -152,20 +152,20 @@ class Limits(LimitedTest):
         clock = Clock(interrupts=[KeyboardInterrupt])
         with BusyServer(refusals=NEVER) as server:
             with clock.installed(), self.assertRaises(KeyboardInterrupt):
-                isomesh.Client(server.url).job("7")
+                isomesh_client.Client(server.url).job("7")
         self.assertEqual(len(server.seen), 1)
 
     def test_waiting_for_a_job_ends_at_its_timeout(self):
         clock = Clock()
         with BusyServer(refusals=NEVER) as server:
             with clock.installed(), self.assertRaises(TimeoutError):
-                isomesh.Client(server.url).wait("7", timeout=30)
+                isomesh_client.Client(server.url).wait("7", timeout=30)
         self.assertTrue(20 < sum(clock.pauses) <= 30, clock.pauses)
 
     def test_a_limit_that_is_none(self):
         for seconds in (-1, float("nan"), float("inf")):
             with self.assertRaisesRegex(ValueError, "retry_seconds"):
-                isomesh.Client("http://127.0.0.1:1", retry_seconds=seconds)
+                isomesh_client.Client("http://127.0.0.1:1", retry_seconds=seconds)
 
 
 class Everything(DaemonTest):
@@ -174,7 +174,7 @@ class Everything(DaemonTest):
         big[100:130, 100:130, 60:90] = 1
         clock = Clock()
         with BusyServer(self.url) as server, clock.installed():
-            client = isomesh.Client(server.url)
+            client = isomesh_client.Client(server.url)
             volume = client.upload(ball())
             client.erase(client.upload(ball() - 1))
             mesh = client.mesh(big, labels=[1], formats=["glb"])
@@ -206,15 +206,15 @@ class Everything(DaemonTest):
         clock = Clock(interrupts=[KeyboardInterrupt])
         with BusyServer(self.url, headers={"Retry-After": "1"}) as server, clock.installed():
             with self.assertRaises(KeyboardInterrupt):
-                isomesh.Client(server.url).mesh(volume, iso=0.5, passes=1000)
-        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
+                isomesh_client.Client(server.url).mesh(volume, iso=0.5, passes=1000)
+        with self.assertRaisesRegex(isomesh_client.JobFailed, "cancelled"):
             self.client.wait(next(iter(self.client.jobs())))
 
     def test_an_interrupt_does_not_wait_long_for_a_server_that_stays_busy(self):
         clock = Clock(interrupts=[KeyboardInterrupt])
         with BusyServer(refusals=NEVER, headers={"Retry-After": "1"}) as server, clock.installed():
             with self.assertRaises(KeyboardInterrupt):
-                isomesh.Client(server.url).mesh({"id": "a" * 64, "notes": []}, iso=-7)
+                isomesh_client.Client(server.url).mesh({"id": "a" * 64, "notes": []}, iso=-7)
         self.assertTrue(1 <= sum(clock.pauses[1:]) <= 2, clock.pauses)
 
 
@@ -241,7 +241,7 @@ class Crowd(DaemonTest):
         def mesh(number):
             sizes[number] = len(self.client.mesh(ball((64, 64, 64)) + number, iso=number - 20).faces)
 
-        with self.place_taken() as release, self.assertLogs("isomesh", "INFO") as waits:
+        with self.place_taken() as release, self.assertLogs("isomesh_client", "INFO") as waits:
             threads = [threading.Thread(target=mesh, args=(number,)) for number in range(self.crowd)]
             for thread in threads:
                 thread.start()

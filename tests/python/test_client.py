@@ -11,9 +11,9 @@ import unittest
 import urllib.request
 from unittest import mock
 
-import isomesh
+import isomesh_client
 import numpy
-from isomesh.transport import Transport
+from isomesh_client.transport import Transport
 from support import DAEMON, Canned, DaemonTest, Relay, UploadRelay, ball
 
 
@@ -42,7 +42,7 @@ class Files(DaemonTest):
         listed = self.write_meta_image(self.folder / "list", "LIST\n" + "\n".join(planes), planes)
         for name in (".hidden", "README.txt", "report.pdf", "Thumbs.db", "empty"):
             (self.folder / "one" / name).write_bytes(b"nothing of the volume" if name != "empty" else b"")
-        bare = isomesh.Raw((40, 32, 24), "float32")
+        bare = isomesh_client.Raw((40, 32, 24), "float32")
         for source, more in (
             (one, {}),
             (str(many), {}),
@@ -51,7 +51,7 @@ class Files(DaemonTest):
             ([one, one.with_name("ball.raw")], {}),
             (one.with_name("ball.raw"), {"raw": bare}),
             (ball().tobytes(order="F"), {"raw": bare}),
-            (ball().astype(">f4").tobytes(order="F"), {"raw": isomesh.Raw((40, 32, 24), "float32", big_endian=True)}),
+            (ball().astype(">f4").tobytes(order="F"), {"raw": isomesh_client.Raw((40, 32, 24), "float32", big_endian=True)}),
         ):
             with self.subTest(source=str(source)[:60]):
                 self.assertEqual(self.client.upload(source, **more)["id"], wanted)
@@ -68,12 +68,31 @@ class Files(DaemonTest):
         answers = self.client.upload_all(folder)
         self.assertEqual([each["member"] for each in answers], ["a.mhd", "b.mhd"])
         self.assertTrue(all(each["volume"] for each in answers))
-        with self.assertRaisesRegex(isomesh.Refused, "member='a.mhd': can be meshed") as refused:
+        with self.assertRaisesRegex(isomesh_client.Refused, "member='a.mhd': can be meshed") as refused:
             self.client.upload(folder)
         self.assertEqual(len(refused.exception.choices), 2)
         chosen = self.client.upload(folder, member="b.mhd", name="the second")
         self.assertEqual(chosen["id"], answers[1]["volume"]["id"])
         self.assertEqual(chosen["name"], "the second")
+
+    def test_a_folder_of_masks_is_one_volume_of_labels(self):
+        folder = self.folder / "masks"
+        folder.mkdir()
+        for name, at in (("liver", 6), ("aorta", 14)):
+            mask = numpy.zeros((20, 12, 12), "uint8")
+            mask[at - 3 : at + 3, 3:9, 3:9] = 1
+            header = self.write_meta_image(folder, f"{name}.raw", [f"{name}.raw"])
+            text = header.read_text().replace("40 32 24", "20 12 12").replace("MET_FLOAT", "MET_UCHAR")
+            header.rename(folder / f"{name}.mhd").write_text(text)
+            (folder / f"{name}.raw").write_bytes(mask.tobytes(order="F"))
+        mesh = self.client.mesh(folder, masks=True, close=True)
+        labels = [(each["label"], each["name"]) for each in mesh.job["mesh"]["labels"]]
+        self.assertEqual(labels, [(1, "aorta"), (2, "liver")])
+        (result,) = self.client.mesh_all([folder], to=self.folder / "all.glb", masks=True, close=True)
+        self.assertEqual(len(result.job["mesh"]["labels"]), 2)
+        (folder / "liver.raw").write_bytes(bytes(range(240)) * 12)
+        with self.assertRaisesRegex(isomesh_client.Refused, '"liver.mhd": It is not a mask'):
+            self.client.mesh(folder, masks=True)
 
     def test_links_in_a_folder_are_followed(self):
         folder = self.folder / "dataset" / "sub"
@@ -96,7 +115,7 @@ class Files(DaemonTest):
             self.client.upload(folder)
 
     def test_an_upload_that_is_too_large_is_refused_with_the_reason(self):
-        with self.assertRaises(isomesh.Refused) as refused:
+        with self.assertRaises(isomesh_client.Refused) as refused:
             self.client.upload(numpy.zeros((200, 200, 200)))
         self.assertEqual(refused.exception.status, 413)
 
@@ -107,7 +126,7 @@ class Files(DaemonTest):
         self.assertIn(volume["id"], [each["id"] for each in self.client.volumes()])
         self.assertEqual(sum(self.client.histogram(volume, 16)["counts"]), 40 * 32 * 24)
         self.client.erase(volume)
-        with self.assertRaises(isomesh.Refused) as refused:
+        with self.assertRaises(isomesh_client.Refused) as refused:
             self.client.volume(volume)
         self.assertEqual(refused.exception.status, 404)
 
@@ -123,7 +142,7 @@ class Files(DaemonTest):
         self.assert_is_gone(second)
 
     def assert_is_gone(self, job):
-        with self.assertRaises(isomesh.Refused) as refused:
+        with self.assertRaises(isomesh_client.Refused) as refused:
             self.client.job(job)
         self.assertEqual(refused.exception.status, 404)
 
@@ -216,11 +235,11 @@ class Jobs(DaemonTest):
             ({"iso": float("nan")}, "cannot be sent"),
             ({"iso": 1, "formats": ["fbx"]}, "fbx|formats"),
         ):
-            with self.subTest(text), self.assertRaisesRegex((isomesh.Refused, ValueError), text):
+            with self.subTest(text), self.assertRaisesRegex((isomesh_client.Refused, ValueError), text):
                 self.client.submit(volume, **parameters)
 
     def test_an_unknown_parameter_is_rejected_before_the_upload(self):
-        unreachable = isomesh.Client("http://127.0.0.1:1")
+        unreachable = isomesh_client.Client("http://127.0.0.1:1")
         for call in (unreachable.mesh, unreachable.submit, unreachable.estimate):
             with self.assertRaisesRegex(TypeError, f"{call.__name__}.. has no parameter 'pases'; did you mean 'passes'"):
                 call("x", iso=1, pases=3)
@@ -240,10 +259,10 @@ class Jobs(DaemonTest):
         with self.assertRaises(TimeoutError):
             self.client.wait(job, timeout=0.3)
         self.client.cancel(job)
-        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled") as failed:
+        with self.assertRaisesRegex(isomesh_client.JobFailed, "cancelled") as failed:
             self.client.wait(job)
         self.assertEqual(failed.exception.job["state"], "cancelled")
-        with self.assertRaises(isomesh.JobFailed):
+        with self.assertRaises(isomesh_client.JobFailed):
             self.client.fetch(job["id"])
 
     def test_an_upload_in_one_call_may_be_described(self):
@@ -251,11 +270,11 @@ class Jobs(DaemonTest):
         self.assertEqual(self.client.volume(mesh.job["parameters"]["volume"])["name"], "from mesh")
 
     def made(self, before):
-        return [job for job in isomesh.Client(self.url).jobs() if job["id"] not in before]
+        return [job for job in isomesh_client.Client(self.url).jobs() if job["id"] not in before]
 
     def assert_the_one_job_is_cancelled(self, before):
         (interrupted,) = self.made(before)
-        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
+        with self.assertRaisesRegex(isomesh_client.JobFailed, "cancelled"):
             self.client.wait(interrupted)
 
     def test_an_interrupt_cancels_the_job(self):
@@ -317,7 +336,7 @@ class Connections(DaemonTest):
         size = mesh.job["mesh"]["files"]["ply"]["bytes"]
         self.assertGreater(size, 200_000)
         with Relay(self.url, cuts=2, after=100_000) as relay:
-            again = isomesh.Client(relay.url).fetch(mesh.job)
+            again = isomesh_client.Client(relay.url).fetch(mesh.job)
         self.assertTrue(numpy.array_equal(again.vertices, mesh.vertices))
         requests = [each for each in relay.requests if b"mesh.ply" in each]
         self.assertNotIn(b"Range:", requests[0])
@@ -333,7 +352,7 @@ class Connections(DaemonTest):
             head = urllib.request.urlopen(f"{relay.url}/v1/jobs/{job['id']}/mesh.obj")
             sizes = len(f"HTTP/1.1 200 OK\r\n{head.headers}".replace("\r\n", "\n").replace("\n", "\r\n"))
         with Relay(self.url, cuts=2, after=sizes + 40) as relay:
-            target = isomesh.Client(relay.url).download(job, self.folder / "left hip.obj")
+            target = isomesh_client.Client(relay.url).download(job, self.folder / "left hip.obj")
         starts = [re.search(rb"Range: bytes=(\d+)-", each) for each in relay.requests if b"mesh.obj" in each]
         self.assertEqual(len(starts), 3)
         self.assertLess(int(starts[1][1]), 100)
@@ -343,14 +362,14 @@ class Connections(DaemonTest):
     def test_a_connection_that_breaks_each_time_is_given_up(self):
         job = self.client.mesh(ball(), iso=-8).job
         target = self.folder / "never.ply"
-        with Relay(self.url, cuts=100, after=1000) as relay, self.assertRaises(isomesh.Unreachable):
-            isomesh.Client(relay.url).download(job, target)
+        with Relay(self.url, cuts=100, after=1000) as relay, self.assertRaises(isomesh_client.Unreachable):
+            isomesh_client.Client(relay.url).download(job, target)
         self.assertEqual([each.name for each in self.folder.iterdir() if "never" in each.name], [])
 
     def test_a_broken_upload_goes_on_where_it_broke(self):
         samples = numpy.random.default_rng(1).integers(0, 100, (256, 256, 160), dtype=numpy.uint8)
         with UploadRelay(self.url, cuts=2, after=3_000_000) as relay:
-            volume = isomesh.Client(relay.url).upload(samples)
+            volume = isomesh_client.Client(relay.url).upload(samples)
         self.assertEqual(volume["id"], self.client.upload(samples)["id"])
         methods = [each.split()[0] for each in relay.requests]
         self.assertEqual(methods, ["POST", "PATCH", "HEAD", "PATCH", "HEAD", "PATCH"])
@@ -367,21 +386,21 @@ class Connections(DaemonTest):
 
         stored = []
         with mock.patch.object(Transport, "send", interrupted), self.assertRaises(KeyboardInterrupt):
-            with self.assertWarnsRegex(isomesh.VolumeWarning, "cancelled too late: .* volume [0-9a-f]{64}$") as warned:
+            with self.assertWarnsRegex(isomesh_client.VolumeWarning, "cancelled too late: .* volume [0-9a-f]{64}$") as warned:
                 self.client.upload(numpy.zeros((128, 128, 128), "float32"))
         self.assertIn(stored[0], str(warned.warnings[0].message))
         self.assertEqual(self.client.volume(stored[0])["id"], stored[0])
 
     def test_an_upload_that_is_refused_is_not_tried_again(self):
-        with UploadRelay(self.url, cuts=0, after=0) as relay, self.assertRaises(isomesh.Refused) as refused:
-            isomesh.Client(relay.url).upload(bytes(9 << 20))
+        with UploadRelay(self.url, cuts=0, after=0) as relay, self.assertRaises(isomesh_client.Refused) as refused:
+            isomesh_client.Client(relay.url).upload(bytes(9 << 20))
         self.assertEqual(refused.exception.status, 415)
         self.assertEqual([each.split()[0] for each in relay.requests], ["POST", "PATCH", "DELETE"])
 
     def test_a_mesh_of_other_bytes_is_refused(self):
         job = self.client.mesh(ball(), iso=-8).job
         job["mesh"]["files"]["ply"]["sha256"] = "0" * 64
-        with self.assertRaises(isomesh.WrongAnswer):
+        with self.assertRaises(isomesh_client.WrongAnswer):
             self.client.fetch(job)
 
     def test_an_answer_without_its_members_is_wrong(self):
@@ -400,34 +419,34 @@ class Connections(DaemonTest):
         for body in ({}, [], {"jobs": [{}], "next": None}, note):
             with Canned(body) as server:
                 for call in calls:
-                    with self.assertRaises(isomesh.WrongAnswer):
-                        call(isomesh.Client(server.url))
-        with Canned(job) as server, self.assertRaisesRegex(isomesh.WrongAnswer, "'mesh' is missing"):
-            isomesh.Client(server.url).wait("j")
+                    with self.assertRaises(isomesh_client.WrongAnswer):
+                        call(isomesh_client.Client(server.url))
+        with Canned(job) as server, self.assertRaisesRegex(isomesh_client.WrongAnswer, "'mesh' is missing"):
+            isomesh_client.Client(server.url).wait("j")
 
     def test_no_server(self):
         for server in ("http://127.0.0.1:1", f"unix:{self.folder}/nothing"):
-            with self.subTest(server), self.assertRaisesRegex(isomesh.Unreachable, "cannot be reached"):
-                isomesh.Client(server).volume("x")
+            with self.subTest(server), self.assertRaisesRegex(isomesh_client.Unreachable, "cannot be reached"):
+                isomesh_client.Client(server).volume("x")
         for server in ("ftp://localhost", "localhost:80", "http://a/path", "http://u@h", "http://h:x", "http://h?q"):
             with self.subTest(server), self.assertRaises(ValueError):
-                isomesh.Client(server)
+                isomesh_client.Client(server)
         with self.assertRaises(ValueError):
-            isomesh.Client(token="a\r\nb")
+            isomesh_client.Client(token="a\r\nb")
         for authorities, reason in (("/no/such.pem", "cannot be read: No such file"), (__file__, "is not a PEM file")):
             with self.assertRaisesRegex(ValueError, f"^authorities: {authorities} {reason}"):
-                isomesh.Client("https://127.0.0.1:1", authorities=authorities)
+                isomesh_client.Client("https://127.0.0.1:1", authorities=authorities)
 
     def test_the_environment_says_where_and_who(self):
         with mock.patch.dict(os.environ, {"ISOMESH_SERVER": self.url, "http_proxy": "http://127.0.0.1:1"}):
-            self.assertEqual(len(list(isomesh.Client().jobs("failed"))), 0)
+            self.assertEqual(len(list(isomesh_client.Client().jobs("failed"))), 0)
 
 
 class Sockets(DaemonTest):
     listen = "unix:FOLDER/socket"
 
     def test_a_unix_socket(self):
-        client = isomesh.Client(f"unix:{self.folder}/socket")
+        client = isomesh_client.Client(f"unix:{self.folder}/socket")
         self.assertGreater(len(client.mesh(ball(), iso=-8).faces), 1000)
 
 
@@ -446,13 +465,13 @@ class Guarded(DaemonTest):
 
     def test_tokens_over_tls(self):
         authorities = str(self.folder / "cert.pem")
-        client = isomesh.Client(self.url, token=self.token, authorities=authorities)
+        client = isomesh_client.Client(self.url, token=self.token, authorities=authorities)
         self.assertGreater(len(client.mesh(ball(), iso=-8).faces), 1000)
-        with self.assertRaises(isomesh.Refused) as refused:
-            list(isomesh.Client(self.url, authorities=authorities).volumes())
+        with self.assertRaises(isomesh_client.Refused) as refused:
+            list(isomesh_client.Client(self.url, authorities=authorities).volumes())
         self.assertEqual(refused.exception.status, 401)
-        with self.assertRaisesRegex(isomesh.Unreachable, "certificate"):
-            list(isomesh.Client(self.url, token=self.token).volumes())
+        with self.assertRaisesRegex(isomesh_client.Unreachable, "certificate"):
+            list(isomesh_client.Client(self.url, token=self.token).volumes())
 
 
 if __name__ == "__main__":

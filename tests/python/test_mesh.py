@@ -13,7 +13,7 @@ import warnings
 from pathlib import Path
 from unittest import mock
 
-import isomesh
+import isomesh_client
 import nibabel
 import numpy
 from limits import LimitedTest
@@ -23,7 +23,7 @@ from support import DaemonTest, ball
 def tetrahedron(labels=None):
     vertices = numpy.array([[0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 4]], "float32")
     faces = numpy.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "uint32")
-    return isomesh.Mesh(vertices, faces, labels)
+    return isomesh_client.Mesh(vertices, faces, labels)
 
 
 class Arrays(LimitedTest):
@@ -53,7 +53,7 @@ class Arrays(LimitedTest):
     def test_bounds(self):
         self.assertEqual(tetrahedron().bounds.tolist(), [[0, 0, 0], [2, 3, 4]])
         self.assertEqual(tetrahedron().in_space("ras").bounds.tolist(), [[-2, -3, 0], [0, 0, 4]])
-        empty = isomesh.Mesh(numpy.zeros((0, 3), "float32"), numpy.zeros((0, 3), "uint32"))
+        empty = isomesh_client.Mesh(numpy.zeros((0, 3), "float32"), numpy.zeros((0, 3), "uint32"))
         self.assertEqual(empty.bounds.tolist(), [[0, 0, 0], [0, 0, 0]])
         self.assertEqual(empty.normals.shape, (0, 3))
 
@@ -83,7 +83,7 @@ class PlyFiles(LimitedTest):
             mesh = tetrahedron(labels).in_space("ras")
             mesh.vertices += 1
             path = mesh.save(self.folder / "changed.PLY")
-            again = isomesh.read_ply(path)
+            again = isomesh_client.read_ply(path)
             self.assertEqual(again.space, "ras")
             self.assertTrue(numpy.array_equal(again.vertices, mesh.vertices))
             self.assertTrue(numpy.array_equal(again.faces, mesh.faces))
@@ -212,10 +212,10 @@ class Jobs(DaemonTest):
         mesh = self.client.mesh(samples, labels="all", formats=["vtp", "zip"])
         self.assertEqual(mesh.save(self.folder / "labels.zip").read_bytes()[:2], b"PK")
         mesh.save(self.folder / "labels.vtp")
-        again = isomesh.read_ply(mesh.save(self.folder / "labels.ply"))
+        again = isomesh_client.read_ply(mesh.save(self.folder / "labels.ply"))
         self.assertTrue(numpy.array_equal(again.labels, mesh.labels))
         # A label's own normals point out of it.
-        of_label = isomesh.Mesh(mesh.vertices, mesh.faces[mesh.labels == 3])
+        of_label = isomesh_client.Mesh(mesh.vertices, mesh.faces[mesh.labels == 3])
         used = numpy.unique(of_label.faces)
         outward = mesh.vertices[used] - mesh.vertices[used].mean(0)
         self.assertGreater(numpy.einsum("ij,ij->i", outward, of_label.normals[used]).min(), 0)
@@ -238,8 +238,8 @@ class Jobs(DaemonTest):
         script = """
 import json, sys
 sys.modules["numpy"] = None
-import isomesh
-mesh = isomesh.read_ply(sys.argv[1])
+import isomesh_client
+mesh = isomesh_client.read_ply(sys.argv[1])
 mesh.in_space("ras").in_space("lps").save(sys.argv[2])
 print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
 """
@@ -259,9 +259,9 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
             mesh.save(plain)
         # Without colours a label is a property of faces, as in the server's files before they had colours.
         mesh.colors = None
-        self.assertIsNone(isomesh.read_ply(mesh.save(plain)).colors)
+        self.assertIsNone(isomesh_client.read_ply(mesh.save(plain)).colors)
         self.assertIn(b"property list uchar uint vertex_indices\nproperty int label\nend_header\n", plain.read_bytes())
-        self.assertEqual(isomesh.read_ply(plain).labels.tolist(), mesh.labels.tolist())
+        self.assertEqual(isomesh_client.read_ply(plain).labels.tolist(), mesh.labels.tolist())
 
     def test_an_obj_of_labels_has_its_materials_beside_it(self):
         samples = numpy.zeros((12, 12, 12), "uint8")
@@ -304,7 +304,7 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         ):
             with self.assertRaisesRegex(ValueError, text):
                 self.client.mesh(volume, iso=-8, **keywords)
-        with self.assertRaises(isomesh.Refused) as refused:
+        with self.assertRaises(isomesh_client.Refused) as refused:
             self.client.mesh("0" * 64, iso=1)
         self.assertEqual(refused.exception.status, 404)
         with self.assertRaisesRegex(TypeError, "not a volume"):
@@ -325,7 +325,7 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
 
         with self.assertRaisesRegex(LookupError, "enough"):
             self.client.mesh(noise, iso=0.5, passes=1000, progress=stop)
-        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
+        with self.assertRaisesRegex(isomesh_client.JobFailed, "cancelled"):
             self.client.wait(seen[0])
 
 
@@ -342,17 +342,17 @@ class Notes(DaemonTest):
 
     def test_a_note_is_a_warning_and_in_the_mesh(self):
         file = self.forms_differ()
-        with self.assertWarnsRegex(isomesh.VolumeWarning, r"^differs.nii.gz: .*360.*\(forms-differ\)$") as warned:
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, r"^differs.nii.gz: .*360.*\(forms-differ\)$") as warned:
             mesh = self.client.mesh(file, iso=-8)
         self.assertEqual(warned.filename, __file__, "the warning is not at the caller's line")
         self.assertEqual([note["code"] for note in mesh.notes], ["forms-differ"])
         self.assertIn("360", mesh.notes[0]["detail"])
-        with self.assertWarns(isomesh.VolumeWarning) as warned:
+        with self.assertWarns(isomesh_client.VolumeWarning) as warned:
             volume = self.client.upload(file)
         self.assertEqual(warned.filename, __file__)
-        with self.assertWarns(isomesh.VolumeWarning):
+        with self.assertWarns(isomesh_client.VolumeWarning):
             self.assertEqual(self.client.mesh(volume["id"], iso=-8).notes, mesh.notes)
-        with self.assertWarns(isomesh.VolumeWarning):
+        with self.assertWarns(isomesh_client.VolumeWarning):
             self.client.upload_all(file)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -364,7 +364,7 @@ class Notes(DaemonTest):
 
     def test_a_script_prints_the_warning_with_its_line(self):
         script = self.folder / "script.py"
-        script.write_text(f"import isomesh\nisomesh.Client({self.url!r}).upload({str(self.forms_differ())!r})\n")
+        script.write_text(f"import isomesh_client\nisomesh_client.Client({self.url!r}).upload({str(self.forms_differ())!r})\n")
         found = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
         self.assertRegex(found.stderr, r"script.py:2: VolumeWarning: differs.nii.gz: .*360")
 
@@ -375,7 +375,7 @@ class Notes(DaemonTest):
             warnings.simplefilter("error")
             mesh = self.client.mesh(samples, labels="all")
         self.assertEqual([note["code"] for note in mesh.notes], ["looks-like-labels"])
-        with self.assertWarnsRegex(isomesh.VolumeWarning, "looks-like-labels"):
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "looks-like-labels"):
             self.client.mesh(samples, iso=0.5)
 
 

@@ -12,7 +12,7 @@ import typing
 import unittest
 from pathlib import Path
 
-import isomesh
+import isomesh_client
 from limits import LimitedTest
 from support import ROOT, DaemonTest
 from test_mesh import TRIMESH
@@ -56,10 +56,10 @@ assert surface.GetNumberOfCells() == len(solid.given["faces"]) == len(mesh.faces
         """As pasted, into a copy of the project. Packages of Debian stand in for those of PyPI."""
         root = self.folder / "project"
         shutil.copytree(PACKAGE, root / "client" / "python", ignore=shutil.ignore_patterns("build", "*.egg-info"))
-        script = "set -e\n" + examples("sh") + "\npython3 -c 'import isomesh; print(isomesh.__file__)'\n"
+        script = "set -e\n" + examples("sh") + "\npython3 -c 'import isomesh_client; print(isomesh_client.__file__)'\n"
         environment = {
             **os.environ, "PATH": "/usr/bin:/bin", "PYTHONPATH": "/usr/lib/python3/dist-packages",
-            "PIP_NO_INDEX": "1", "PIP_NO_BUILD_ISOLATION": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+            "PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1",
         }
         found = subprocess.run(["sh", "-c", script], cwd=root, env=environment, capture_output=True, text=True)
         self.assertEqual(found.returncode, 0, found.stdout + found.stderr)
@@ -72,29 +72,40 @@ class Package(LimitedTest):
         cls.cache = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.cache.cleanup)
 
-    def test_pip_installs_it(self):
+    def test_pip_installs_it_without_a_network(self):
         with tempfile.TemporaryDirectory() as folder:
-            # The build leaves traces beside its sources.
-            source = Path(folder, "source")
-            shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("build", "*.egg-info", "__pycache__"))
             subprocess.check_call(
-                [sys.executable, "-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps",
-                 "--no-index", "--target", Path(folder, "to"), source],
+                [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--target", Path(folder, "to"), PACKAGE],
                 env={**os.environ, "PIP_ROOT_USER_ACTION": "ignore", "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
             )
-            installed = sorted(each.name for each in Path(folder, "to", "isomesh").iterdir() if each.is_file())
-            sources = sorted(each.name for each in (PACKAGE / "src" / "isomesh").iterdir() if each.is_file())
+            installed = sorted(each.name for each in Path(folder, "to", "isomesh_client").iterdir() if each.is_file())
+            sources = sorted(each.name for each in (PACKAGE / "src" / "isomesh_client").iterdir() if each.is_file())
             self.assertEqual(installed, sources)
             self.assertIn("py.typed", installed)
-            script = "import isomesh, sys; print(isomesh.__version__, 'numpy' in sys.modules, isomesh.__file__)"
+            script = "import isomesh_client, sys; print(isomesh_client.__version__, 'numpy' in sys.modules, isomesh_client.__file__)"
             environment = {**os.environ, "PYTHONPATH": str(Path(folder, "to"))}
             printed = subprocess.check_output([sys.executable, "-c", script], text=True, env=environment)
-            self.assertEqual(printed.split()[:2], [isomesh.__version__, "False"])
+            self.assertEqual(printed.split()[:2], [isomesh_client.__version__, "False"])
             self.assertTrue(printed.split()[2].startswith(folder))
+            found = subprocess.run([sys.executable, "-c", "import isomesh"], env=environment, capture_output=True, text=True)
+            self.assertIn("No module named 'isomesh'", found.stderr)  # that name is another project's
+
+    def test_the_same_sources_make_the_same_packages(self):
+        """Also in another folder; the source distribution has what makes it and the wheel."""
+        code = "import backend, sys; print(backend.build_wheel(sys.argv[1]), backend.build_sdist(sys.argv[1]))"
+        with tempfile.TemporaryDirectory() as folder:
+            first, second = Path(folder, "first"), Path(folder, "second")
+            for target, source in ((first, PACKAGE), (second, Path(folder) / f"isomesh_client-{isomesh_client.__version__}")):
+                target.mkdir()
+                names = subprocess.check_output([sys.executable, "-c", code, target], cwd=source, text=True).split()
+                subprocess.check_call(["tar", "-xf", target / names[1], "-C", folder])
+            self.assertEqual(names, [f"isomesh_client-{isomesh_client.__version__}{end}" for end in ("-py3-none-any.whl", ".tar.gz")])
+            for name in names:
+                self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
 
     def test_its_version_is_the_projects(self):
         project = (ROOT / "CMakeLists.txt").read_text()
-        self.assertIn(f"project(isomesh VERSION {isomesh.__version__} ", project)
+        self.assertIn(f"project(isomesh VERSION {isomesh_client.__version__} ", project)
 
     def test_generated_files_are_up_to_date(self):
         subprocess.check_call([sys.executable, PACKAGE / "generate", "--check"])
@@ -107,18 +118,18 @@ class Package(LimitedTest):
         for off in ("off", "'off'", '"off"'):
             text = f"components: {{schemas: {{MeshFormat: {{type: string, enum: [ply, {off}, on, yes, no]}}, {BARE}}}}}"
             self.assertIn("MeshFormat = Literal['ply', 'off', 'on', 'yes', 'no']", generate.types_of(text).texts[0])
-        self.assertTrue(all(isinstance(each, str) for each in typing.get_args(isomesh.api.MeshFormat)))
-        self.assertIn("off", typing.get_args(isomesh.api.MeshFormat))
+        self.assertTrue(all(isinstance(each, str) for each in typing.get_args(isomesh_client.api.MeshFormat)))
+        self.assertIn("off", typing.get_args(isomesh_client.api.MeshFormat))
 
     def test_help_describes_the_parameters(self):
-        script = "import isomesh\nhelp(isomesh.api.JobOptions)\nhelp(isomesh.Client.mesh)"
+        script = "import isomesh_client\nhelp(isomesh_client.api.JobOptions)\nhelp(isomesh_client.Client.mesh)"
         text = subprocess.check_output([sys.executable, "-c", script], text=True)
         described, call = text.split("Help on function mesh")
-        for name in isomesh.api.JobOptions.__annotations__:
+        for name in isomesh_client.api.JobOptions.__annotations__:
             self.assertRegex(described, rf"(?m)^ \|  {name}\n \|      \S")
             self.assertRegex(call, rf"\b{name}: '.*' = <default>")
-        self.assertIn("lambda_", isomesh.api.JobOptions.__annotations__)
-        self.assertIn("passes", typing.get_type_hints(isomesh.api.JobOptions))
+        self.assertIn("lambda_", isomesh_client.api.JobOptions.__annotations__)
+        self.assertIn("passes", typing.get_type_hints(isomesh_client.api.JobOptions))
 
     def mypy(self, code, config="[mypy]\n"):
         """What `mypy --strict` prints of a program with this code, as a user runs it."""
@@ -134,7 +145,7 @@ class Package(LimitedTest):
 
     def test_types_hold(self):
         mypy = [sys.executable, "-m", "mypy", "--config-file", PACKAGE / "pyproject.toml", "--no-error-summary"]
-        subprocess.check_call([*mypy, "--cache-dir", self.cache.name, PACKAGE / "src" / "isomesh"])
+        subprocess.check_call([*mypy, "--cache-dir", self.cache.name, PACKAGE / "src" / "isomesh_client"])
 
     def test_types_fit_the_readme(self):
         # This version of nibabel has no types.
@@ -142,9 +153,9 @@ class Package(LimitedTest):
         self.assertEqual(self.mypy(examples("python"), config=untyped), [])
 
     def test_types_find_mistakes(self):
-        head = "import isomesh\nclient = isomesh.Client()\n"
+        head = "import isomesh_client\nclient = isomesh_client.Client()\n"
         right = """
-options: isomesh.api.JobOptions = {"iso": 3, "formats": ["off"]}
+options: isomesh_client.api.JobOptions = {"iso": 3, "formats": ["off"]}
 client.mesh("x", iso="otsu", formats=["off", "glb"], lambda_=0.5, components={"keep": 1}, close=True).save("x.off")
 client.mesh("x", accept=["frame-of-reference"], **options)
 done = client.wait(client.submit("x", labels=[1, 2], draco={"position_bits": 12}))

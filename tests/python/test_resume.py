@@ -4,9 +4,9 @@ import unittest
 from types import SimpleNamespace
 from unittest import mock
 
-from isomesh import resume
-from isomesh.errors import Refused, Unreachable
-from isomesh.uploads import Body
+from isomesh_client import resume
+from isomesh_client.errors import Refused, Unreachable
+from isomesh_client.uploads import Body
 
 PLACE = "/v1/uploads/7"
 BODY = Body(1000, lambda: iter([bytes(1000)]))

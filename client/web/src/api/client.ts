@@ -89,6 +89,7 @@ export class Client {
     return this.connection.json(`/v1/volumes${queryOf({ order: 'newest', limit, cursor })}`, { signal });
   }
 
+  /** What the server knows of a volume: its grid, its values, what was decided when it was read. */
   getVolume(id: string): Promise<Volume> {
     return this.connection.json(volumePath(id));
   }
@@ -107,6 +108,7 @@ export class Client {
     await this.connection.send(`${volumePath(id)}${queryOf({ jobs })}`, { method: 'DELETE' });
   }
 
+  /** Counts the samples in `bins` intervals of the same width, from the least value to the greatest. */
   histogramOf(id: string, bins: number, signal?: GlobalAbortSignal): Promise<Histogram> {
     return this.connection.json(`${volumePath(id)}/histogram?bins=${bins}`, { signal });
   }
@@ -123,6 +125,7 @@ export class Client {
     return list;
   }
 
+  /** A slice as PNG; `window` has the values that are black and white. */
   async slicePicture(
     id: string,
     axis: Axis,
@@ -244,6 +247,7 @@ export class Client {
     return (await this.connection.json<{ orders: boolean }>('/version')).orders;
   }
 
+  /** Each PACS of the server, and when it last answered. */
   listPacs(signal?: GlobalAbortSignal): Promise<PacsList> {
     return this.connection.json('/v1/pacs', { signal });
   }
@@ -262,6 +266,7 @@ export class Client {
     });
   }
 
+  /** An order that has ended meanwhile stays as it is. */
   cancelOrder(id: string): Promise<Order> {
     return this.connection.json(orderPath(id), { method: 'DELETE' });
   }

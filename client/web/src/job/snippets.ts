@@ -68,8 +68,8 @@ export function pythonSnippet(origin: string, job: JobParameters, hasToken: bool
   // lambda is a word of Python's own.
   const options = Object.entries(others).map(([name, value]) => `    ${name === 'lambda' ? 'lambda_' : name}=${python(value)},`);
   return [
-    hasToken ? 'import os, isomesh' : 'import isomesh',
-    `client = isomesh.Client(${JSON.stringify(origin)}${hasToken ? ', token=os.environ["ISOMESH_TOKEN"]' : ''})`,
+    hasToken ? 'import os, isomesh_client' : 'import isomesh_client',
+    `client = isomesh_client.Client(${JSON.stringify(origin)}${hasToken ? ', token=os.environ["ISOMESH_TOKEN"]' : ''})`,
     'job = client.wait(client.submit(',
     `    ${JSON.stringify(volume)},`,
     ...options,
