@@ -76,8 +76,8 @@ bool has_bytes(const std::filesystem::path& file) {
 
 std::string OrderSteps::pacs_of(const store::OrderRecord& record) {
   const auto& workitem = record.work.workitem;
-  if (workitem && (workitem->ending || !workitem->claimed ||
-                   record.order.state == OrderState::kMeshing)) {
+  if (workitem &&
+      (workitem->ending || !workitem->claimed || record.order.state == OrderState::kMeshing)) {
     return workitem->worklist;
   }
   switch (record.order.state) {
