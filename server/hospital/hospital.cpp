@@ -12,6 +12,7 @@
 #include "server/hospital/c_store/listener.h"
 #include "server/hospital/c_store/sender.h"
 #include "server/hospital/dicomweb/dicomweb.h"
+#include "server/hospital/dicomweb/ups.h"
 #include "server/hospital/orders/orders.h"
 #include "server/hospital/orders/received.h"
 #include "server/hospital/orders/settings.h"
@@ -122,7 +123,10 @@ class OpenHospital {
     if (!pacs.dicomweb.empty()) {
       const auto web = std::make_shared<dicomweb::DicomWeb>(pacs, scratch,
                                                             settings.max_upload_bytes, responses_);
-      peer = {.source = web, .archive = web, .receiver = web};
+      peer = {.source = web,
+              .archive = web,
+              .receiver = web,
+              .worklist = std::make_shared<dicomweb::Ups>(pacs, scratch, responses_)};
     }
     if (pacs.send_by == orders::SendBy::kCStore) {
       peer.receiver = std::make_shared<c_store::Sender>(pacs, *dimse_);

@@ -257,7 +257,9 @@ class Objects(Loop):
         for segment in (dicom.SKULL, dicom.LESION):
             for code in ("category", "type", "region"):
                 self.assertIn(segment[code][0], said)
-        self.assertIn(f"[{instance}]", self.value(path, "0008,1155"))
+        self.assertEqual(self.value(path, "0008,1155").count(f"[{instance}]"), 3)
+        self.assertEqual(self.value(path, "0062,000b"), ["1", "2"])
+        self.assertEqual(self.value(path, "0040,a124").count(f"[{series.uid}]"), 2)
 
     def document(self, path):
         """The text that the object encapsulates: its element (0042,0011)."""

@@ -21,20 +21,6 @@ constexpr const char* kSeriesFields =
     "includefield=00201209&includefield=00080060&includefield=0008103E";
 constexpr const char* kPatientField = "includefield=00100020";
 
-// Throws unless the status promises a response of the requested kind.
-void check_status(const PeerResponseHead& head) {
-  const int status = head.status;
-  if (status >= 200 && status < 300) return;
-  const std::string said = "the PACS responded with status " + std::to_string(status);
-  if (status == 401 || status == 403) throw PacsFailure(PacsFault::kUnauthorized, said);
-  constexpr int kNotImplemented = 501;
-  const bool is_busy = status == 408 || status == 425 || status == 429 || status >= 500;
-  if (is_busy && status != kNotImplemented) {
-    throw PacsFailure(PacsFault::kBusy, said, head.retry_after);
-  }
-  throw PacsFailure(PacsFault::kRefused, said);
-}
-
 FoundSeries series_of(const PeersObject& object) {
   return {.study = object.study,
           .series = object.series,
@@ -109,6 +95,19 @@ bool is_duplicate(std::optional<std::uint16_t> reason) {
 }
 
 }  // namespace
+
+void check_status(const PeerResponseHead& head) {
+  const int status = head.status;
+  if (status >= 200 && status < 300) return;
+  const std::string said = "the PACS responded with status " + std::to_string(status);
+  if (status == 401 || status == 403) throw PacsFailure(PacsFault::kUnauthorized, said);
+  constexpr int kNotImplemented = 501;
+  const bool is_busy = status == 408 || status == 425 || status == 429 || status >= 500;
+  if (is_busy && status != kNotImplemented) {
+    throw PacsFailure(PacsFault::kBusy, said, head.retry_after);
+  }
+  throw PacsFailure(PacsFault::kRefused, said);
+}
 
 PeersResponse read_response(jobs::ImportRunner& runner, const std::filesystem::path& file) {
   try {
@@ -285,6 +284,13 @@ bool DicomWeb::has_instance(const orders::InstancePlace& place, const std::stop_
                         "/instances?SOPInstanceUID=" + place.instance,
                     &PeersObject::instance, place.instance, stop)
       .has_value();
+}
+
+std::string DicomWeb::segmented_series(const std::string& study, const std::string& series,
+                                       const std::stop_token& stop) {
+  const SearchPage metadata =
+      fetch_page("/studies/" + study + "/series/" + series + "/metadata", stop);
+  return metadata.objects.size() == 1 ? metadata.objects.front().segmented_series : "";
 }
 
 void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token& stop) {

@@ -17,6 +17,9 @@ using import::PeersResponse;
 // read, and as jobs::ImportRunner::read_response does.
 PeersResponse read_response(jobs::ImportRunner& runner, const std::filesystem::path& file);
 
+// Throws PacsFailure unless the status promises a response of the requested kind.
+void check_status(const PeerResponseHead& head);
+
 class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
  public:
   // `scratch` is a folder for responses; the limit of bytes applies to one series. `responses`
@@ -37,6 +40,8 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
   std::optional<std::string> patient_of(const std::string& study,
                                         const std::stop_token& stop) override;
   bool has_instance(const orders::InstancePlace& place, const std::stop_token& stop) override;
+  std::string segmented_series(const std::string& study, const std::string& series,
+                               const std::stop_token& stop) override;
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:

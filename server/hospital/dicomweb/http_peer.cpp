@@ -109,6 +109,7 @@ class Exchange {
       curl_easy_setopt(easy, CURLOPT_POST, 1L);
       curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body->bytes));
       curl_easy_setopt(easy, CURLOPT_UPLOAD_BUFFERSIZE, 512L * 1024);
+      if (request_.is_put) curl_easy_setopt(easy, CURLOPT_CUSTOMREQUEST, "PUT");
     }
     curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers_.get());
   }

@@ -24,6 +24,7 @@ struct PeerRequest {
   std::string target;  // path and query, relative to the PACS' address
   std::string accept;
   const RequestBody* body = nullptr;    // null: a GET
+  bool is_put = false;                  // otherwise a body is sent by POST
   std::filesystem::path response_file;  // for the response's body
   std::uint64_t most_bytes = 0;         // limit of the response's body
 };

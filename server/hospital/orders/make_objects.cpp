@@ -233,6 +233,7 @@ std::string report_of(const store::OrderRecord& record, const Job& job, const Ma
   object.series_uid = series_uid_of(identity, job, object.format);
   dicom::MeasurementReport report = {
       .identity = identity,
+      .segmented_series_uid = record.work.segmented_series,
       .series_uid = object.series_uid,
       .sop_instance_uid = {},
       .series_number = record.work.series_number.value_or(0),

@@ -178,7 +178,7 @@ Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
     }
   }
   erase_unnamed(services_.blobs, services_.volumes, objects);
-  ended(order.id);
+  if (is_final(order.state)) ended(order.id);
   changed();
   return order;
 }
@@ -378,7 +378,10 @@ void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Erro
   ++record.work.failures;
   record.work.failed_in = std::max(record.work.failed_in, std::optional(failed));
   ++order.attempts;
-  order.error = to_problem(error, "/v1/orders/" + order.id);
+  const auto& workitem = record.work.workitem;
+  // The reason of the order's failure stays, whatever happens when the worklist is told.
+  if (!workitem || workitem->ending != OrderState::kFailed)
+    order.error = to_problem(error, "/v1/orders/" + order.id);
   const Time next = now + std::min<milliseconds>(delay, settings_.give_up);
   order.next_attempt = timestamp_of(next);
   if (!services_.orders.save(record, next)) return;
@@ -402,10 +405,21 @@ void Orders::end_damaged(store::OrderRecord& record) {
   save_failed(record, problem, "damaged");
 }
 
-void Orders::save_failed(store::OrderRecord& record, const Problem& problem,
-                         const std::string& reason) {
+void Orders::save_failed(store::OrderRecord& record, Problem problem, const std::string& reason) {
+  // The reason of the order's failure stays, whatever happens when the worklist is told.
+  const auto& workitem = record.work.workitem;
+  if (workitem && workitem->ending == OrderState::kFailed && record.order.error) {
+    problem = *record.order.error;
+  }
   Order& order = record.order;
-  order.state = OrderState::kFailed;
+  if (store::end_at_worklist(record, OrderState::kFailed)) {
+    order.error = problem;
+    if (!services_.orders.save(record, options_.now())) return;
+    log(record, reason);
+    return changed();
+  }
+  const bool is_cancelled = workitem && workitem->ending == OrderState::kCancelled;
+  order.state = is_cancelled ? OrderState::kCancelled : OrderState::kFailed;
   order.finished = timestamp_of(options_.now());
   order.next_attempt.reset();
   order.error = problem;

@@ -106,6 +106,8 @@ class Orders {
   void receive(const std::stop_token& stop);
   store::ReceivedFate look_at_received(const store::HeldSeries& series);
   void look_at_rule(const Rule& rule, const std::stop_token& stop);
+  void look_at_worklist(const Rule& rule, const std::stop_token& stop);
+  void note_watch_failure(const Rule& rule, const std::string& pacs);
   // Takes the next due order for this thread; empty if there is none, or after `stop`.
   std::optional<std::string> take(const std::stop_token& stop, std::stop_token& cancelled);
   std::optional<std::string> take_one_of(const std::vector<store::OrderRecord>& due,
@@ -120,7 +122,7 @@ class Orders {
   void end(store::OrderRecord& record, const Error& error);
   void end_damaged(store::OrderRecord& record);
   // Saves the end of an order that has failed with that error.
-  void save_failed(store::OrderRecord& record, const Problem& problem, const std::string& reason);
+  void save_failed(store::OrderRecord& record, Problem problem, const std::string& reason);
   void note_success(const std::string& pacs);
   void note_failure(const std::string& pacs, const PacsFailure& failure, const std::string& order);
   std::uint64_t generation() const;

@@ -110,6 +110,10 @@ class Archive : public SeriesSource {
                                                 const std::stop_token& stop) = 0;
 
   virtual bool has_instance(const InstancePlace& place, const std::stop_token& stop) = 0;
+
+  // The series of images that a series of one segmentation refers to; empty if unknown.
+  virtual std::string segmented_series(const std::string& study, const std::string& series,
+                                       const std::stop_token& stop) = 0;
 };
 
 // A PACS that stores objects. As SeriesSource.
@@ -122,11 +126,41 @@ class ObjectReceiver {
   virtual void store(const OutgoingObject& object, const std::stop_token& stop) = 0;
 };
 
+struct FoundWorkitem {
+  std::string uid;
+  std::string state;      // "SCHEDULED" and so on
+  std::string readiness;  // of its input: "READY" and so on
+  std::string study;      // of its only input; empty if there are several or none
+  std::string series;
+  std::vector<std::string> procedures;  // VALUE^SCHEME^MEANING
+};
+
+// A worklist of Unified Procedure Steps (PS3.18, 11). As SeriesSource.
+class Worklist {
+ public:
+  virtual ~Worklist() = default;
+
+  virtual std::vector<FoundWorkitem> find_scheduled(const std::stop_token& stop) = 0;
+
+  // Empty if there is no such workitem.
+  virtual std::optional<FoundWorkitem> find_workitem(const std::string& uid,
+                                                     const std::stop_token& stop) = 0;
+
+  // Both return false if the worklist rejects this because of the state or the transaction of the
+  // workitem, or does not have it.
+  virtual bool change_state(const Workitem& item, const std::string& state,
+                            const std::stop_token& stop) = 0;
+  // `changes` is a JSON object of attributes.
+  virtual bool update(const Workitem& item, const std::string& changes,
+                      const std::stop_token& stop) = 0;
+};
+
 // The capabilities of a peer; null for those it lacks.
 struct Peer {
   std::shared_ptr<SeriesSource> source;
   std::shared_ptr<Archive> archive;
   std::shared_ptr<ObjectReceiver> receiver;
+  std::shared_ptr<Worklist> worklist = {};
 };
 
 }  // namespace isomesh::orders

@@ -142,6 +142,10 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     record.work.confirmed.reset();
     save_after(OrderState::kSending, record, now_());
   }
+  if (record.work.workitem) {
+    record.work.workitem->ending = OrderState::kSucceeded;
+    return save_after(OrderState::kSending, record, now_());
+  }
   record.order.state = OrderState::kSucceeded;
   record.order.finished = timestamp_of(now_());
   return save_after(OrderState::kSucceeded, record, now_());

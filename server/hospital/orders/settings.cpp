@@ -262,6 +262,28 @@ std::string as_json(const toml::table& table) {
   return text.str();
 }
 
+void read_worklist(Section& section, Rule& rule) {
+  std::string worklist;
+  section.read("worklist", worklist);
+  section.read("procedures", rule.procedures);
+  section.read("images", rule.images);
+  if (worklist.empty()) {
+    if (rule.procedures.empty() && rule.images.empty()) return;
+    refuse(section.key_of("worklist"), "is required if procedures or images is given");
+  }
+  rule.worklist = worklist;
+  if (rule.images.empty()) rule.images = worklist;
+  const auto is_code = [](const std::string& code) {
+    const std::size_t caret = code.find('^');
+    return caret != std::string::npos && caret > 0 && caret + 1 < code.size() &&
+           code.find('^', caret + 1) == std::string::npos && !has_control_characters(code);
+  };
+  if (rule.procedures.empty() || !std::ranges::all_of(rule.procedures, is_code)) {
+    refuse(section.key_of("procedures"),
+           "must be a list of codes, each \"VALUE^SCHEME\" as in \"MESH^99HOSP\"");
+  }
+}
+
 Rule read_rule(Section section) {
   Rule rule;
   section.read("name", rule.name);
@@ -274,6 +296,7 @@ Rule read_rule(Section section) {
   std::string watch;
   section.read("watch", watch);
   if (!watch.empty()) rule.watch = watch;
+  read_worklist(section, rule);
   if (auto match = section.section("match")) rule.match = read_match(std::move(*match));
   if (auto parameters = section.section("parameters")) {
     rule.parameters = as_json(parameters->table());
@@ -350,6 +373,10 @@ void check_names(const HospitalSettings& settings) {
     }
     std::vector<std::string> used;
     if (rule.watch) used.push_back(*rule.watch);
+    if (rule.worklist) {
+      used.push_back(*rule.worklist);
+      used.push_back(rule.images);
+    }
     for (const SendTarget& target : rule.send) used.push_back(target.pacs);
     for (const std::string& name : used) {
       if (names.contains(name)) continue;
@@ -357,6 +384,10 @@ void check_names(const HospitalSettings& settings) {
     }
     if (rule.watch && settings.find_pacs(*rule.watch)->dicomweb.empty()) {
       refuse("rules." + rule.name + ".watch", "names a PACS without dicomweb");
+    }
+    if (rule.worklist && (settings.find_pacs(*rule.worklist)->dicomweb.empty() ||
+                          settings.find_pacs(rule.images)->dicomweb.empty())) {
+      refuse("rules." + rule.name + ".worklist", "and images must name PACS with dicomweb");
     }
   }
   if (!settings.dimse) return;

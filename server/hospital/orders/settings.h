@@ -48,7 +48,10 @@ struct Rule {
   std::string owner;  // name of the token that owns its orders
   std::string label;  // name of its meshes
   std::int64_t series_number = 9001;
-  std::optional<std::string> watch;  // the PACS to query for new series
+  std::optional<std::string> watch;     // the PACS to query for new series
+  std::optional<std::string> worklist;  // the PACS whose workitems it performs
+  std::vector<std::string> procedures;  // their codes, VALUE^SCHEME
+  std::string images;                   // the PACS with the images of the workitems
   SeriesMatch match;
   // Largest error of simplifying a mesh that is too large for its PACS; empty: such an order fails.
   std::optional<double> max_error_mm;

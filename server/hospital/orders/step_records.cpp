@@ -44,6 +44,7 @@ void forget_images(store::OrderRecord& record) {
   record.work.listed.clear();
   record.work.listed_since.reset();
   record.work.triangles.reset();
+  record.work.segmented_series.clear();
 }
 
 }  // namespace isomesh::orders

@@ -62,6 +62,10 @@ void check_count_of_objects(const Order& order, const Job& job) {
                   " objects; order fewer labels, or send them as obj");
 }
 
+bool is_reported(const Order& order) {
+  return std::ranges::find(order.send, SendFormat::kSr, &SendTarget::format) != order.send.end();
+}
+
 bool has_bytes(const std::filesystem::path& file) {
   std::error_code missing;
   const std::uintmax_t bytes = std::filesystem::file_size(file, missing);
@@ -71,6 +75,11 @@ bool has_bytes(const std::filesystem::path& file) {
 }  // namespace
 
 std::string OrderSteps::pacs_of(const store::OrderRecord& record) {
+  const auto& workitem = record.work.workitem;
+  if (workitem &&
+      (workitem->ending || !workitem->claimed || record.order.state == OrderState::kMeshing)) {
+    return workitem->worklist;
+  }
   switch (record.order.state) {
     case OrderState::kWaiting:
     case OrderState::kFetching:
@@ -87,6 +96,11 @@ std::string OrderSteps::pacs_of(const store::OrderRecord& record) {
 
 Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop,
                          std::vector<std::string>& stored) const {
+  if (const auto& workitem = record.work.workitem; workitem && !is_final(record.order.state)) {
+    if (workitem->ending) return tell_end(record, stop);
+    if (!workitem->claimed) return claim(record, stop);
+    if (!tell(record, stop)) return now_();
+  }
   switch (record.order.state) {
     case OrderState::kWaiting:
       return wait_for_series(record, stop);
@@ -218,6 +232,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
     if (!record.order.send.empty()) check_identity(*volume.dicom);
     record.order.volume = volume.id;
     record.work.identity = volume.dicom;
+    record.work.segmented_series = segmented_series_of(record, stop);
   } catch (const Error& error) {
     // Images that make no volume have crossed the network, too.
     if (!entry.success && has_bytes(file)) services_.audit.add(entry);
@@ -230,15 +245,24 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   return save_after(OrderState::kFetching, record, now_());
 }
 
+// Only a report on labels needs it.
+std::string OrderSteps::segmented_series_of(const store::OrderRecord& record,
+                                            const std::stop_token& stop) const {
+  const OrderSource& source = record.order.source;
+  const auto& archive = peer(source.pacs).archive;
+  if (!is_reported(record.order) || !record.order.parameters.labels || !archive ||
+      record.work.identity->segments.empty() || record.work.identity->instances.size() != 1) {
+    return "";
+  }
+  return archive->segmented_series(source.study, source.series, stop);
+}
+
 Time OrderSteps::submit_job(store::OrderRecord& record) const {
   JobParameters parameters;
   static_cast<MeshParameters&>(parameters) = record.order.parameters;
   if (record.work.triangles) simplify(record.work, parameters);
   // A report tells how far the mesh may be from the surface.
-  if (std::ranges::find(record.order.send, SendFormat::kSr, &SendTarget::format) !=
-      record.order.send.end()) {
-    parameters.certify = true;
-  }
+  if (is_reported(record.order)) parameters.certify = true;
   parameters.volume = *record.order.volume;
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;

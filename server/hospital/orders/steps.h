@@ -65,11 +65,22 @@ class OrderSteps {
   // Adds a query of the order's PACS, and its success, to the audit trail.
   void note_query(store::OrderRecord& record, bool success) const;
   store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
+  // Steps of orders that perform a workitem: worklist_steps.cpp.
+  Worklist& worklist(const Workitem& item) const;
+  store::Time claim(store::OrderRecord& record, const std::stop_token& stop) const;
+  // Tells the worklist of the order's step. Returns false, after ending the order, if the worklist
+  // has ended the workitem.
+  bool tell(store::OrderRecord& record, const std::stop_token& stop) const;
+  store::Time tell_end(store::OrderRecord& record, const std::stop_token& stop) const;
+  std::string performed(const store::OrderRecord& record) const;
+
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time mesh(store::OrderRecord& record, const std::stop_token& stop,
                    std::vector<std::string>& stored) const;
   bool is_lost(const Error& error, const store::OrderRecord& record,
                const std::stop_token& stop) const;
+  std::string segmented_series_of(const store::OrderRecord& record,
+                                  const std::stop_token& stop) const;
   store::Time submit_job(store::OrderRecord& record) const;
   store::Time make(store::OrderRecord& record, const Job& job, const std::stop_token& stop,
                    std::vector<std::string>& stored) const;

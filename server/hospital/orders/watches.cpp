@@ -4,7 +4,9 @@
 #include <utility>
 
 #include "base/clock.h"
+#include "base/ids.h"
 #include "base/log.h"
+#include "server/hospital/objects/uid.h"
 #include "server/hospital/orders/orders.h"
 
 namespace isomesh::orders {
@@ -26,6 +28,20 @@ bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {
     return false;
   }
   return series.instances.value_or(match.min_instances) >= match.min_instances;
+}
+
+// The procedure of a workitem that the rule performs; null if it does not.
+const std::string* wanted_procedure(const FoundWorkitem& item, const Rule& rule) {
+  if (item.state != "SCHEDULED" || (!item.readiness.empty() && item.readiness != "READY") ||
+      item.study.empty() || item.series.empty()) {
+    return nullptr;
+  }
+  const auto is_wanted_code = [&](const std::string& code) {
+    return std::ranges::any_of(
+        rule.procedures, [&](const std::string& wanted) { return code.starts_with(wanted + '^'); });
+  };
+  const auto found = std::ranges::find_if(item.procedures, is_wanted_code);
+  return found == item.procedures.end() ? nullptr : &*found;
 }
 
 }  // namespace
@@ -60,8 +76,17 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
       throw PacsFailure(PacsFault::kIncomplete, "the PACS does not list all recent series");
     }
     note_success(*rule.watch);
+  } catch (...) {
+    note_watch_failure(rule, *rule.watch);
+  }
+}
+
+// Call while an exception is handled.
+void Orders::note_watch_failure(const Rule& rule, const std::string& pacs) {
+  try {
+    throw;
   } catch (const PacsFailure& failure) {
-    note_failure(*rule.watch, failure, "");
+    note_failure(pacs, failure, "");
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCancelled)
       log_error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
@@ -70,11 +95,45 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
   }
 }
 
+void Orders::look_at_worklist(const Rule& rule, const std::stop_token& stop) {
+  const auto peer = services_.peers.find(*rule.worklist);
+  if (peer == services_.peers.end() || !peer->second.worklist) return;
+  try {
+    for (const FoundWorkitem& item : peer->second.worklist->find_scheduled(stop)) {
+      const std::string* procedure = wanted_procedure(item, rule);
+      if (procedure == nullptr) continue;
+      store::OrderRecord record = make_order(rule, rule.images,
+                                             {.study = item.study,
+                                              .series = item.series,
+                                              .modality = "",
+                                              .description = "",
+                                              .instances = std::nullopt});
+      record.work.workitem = Workitem{.worklist = *rule.worklist,
+                                      .uid = item.uid,
+                                      .procedure = *procedure,
+                                      .transaction = dicom::name_based_uid(random_hex(32))};
+      // The key is the same for all attempts, also of other processes.
+      const store::OrderSubmission submission =
+          services_.orders.submit({.record = record,
+                                   .idempotency_key = "workitem " + *rule.worklist + ' ' + item.uid,
+                                   .request_digest = "workitem"},
+                                  settings_.most_open);
+      if (submission.kind != store::OrderSubmission::Kind::kNew) continue;
+      log(record, "");
+      changed();
+    }
+    note_success(*rule.worklist);
+  } catch (...) {
+    note_watch_failure(rule, *rule.worklist);
+  }
+}
+
 void Orders::watch(const std::stop_token& stop) {
   store::Time next_forgetting = options_.now();
   while (!stop.stop_requested()) {
     for (const Rule& rule : settings_.rules) {
       if (rule.watch && !stop.stop_requested() && !is_paused()) look_at_rule(rule, stop);
+      if (rule.worklist && !stop.stop_requested() && !is_paused()) look_at_worklist(rule, stop);
     }
     try {
       const store::Time now = options_.now();

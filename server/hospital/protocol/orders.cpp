@@ -67,6 +67,16 @@ void visit(Is<OrderRequest> auto& self, auto&& field) {
   field(Parameter{.name = "callback"}, self.callback);
 }
 
+void visit(Is<Workitem> auto& self, auto&& field) {
+  field("worklist", self.worklist);
+  field("uid", self.uid);
+  field("procedure", self.procedure);
+  field("transaction", self.transaction);
+  field("claimed", self.claimed);
+  field("told", self.told);
+  field("ending", self.ending);
+}
+
 void visit(Is<OrderWork> auto& self, auto&& field) {
   field("listed", self.listed);
   field("listed_since", self.listed_since);
@@ -85,6 +95,8 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("confirmed", self.confirmed);
   field("failed_in", self.failed_in);
   field("contents", self.contents);
+  field("workitem", self.workitem);
+  field("segmented_series", self.segmented_series);
 }
 
 void visit(Is<PacsStatus> auto& self, auto&& field) {

@@ -99,6 +99,20 @@ struct Order {
   bool operator==(const Order&) const = default;
 };
 
+// A workitem of a worklist (PS3.18, 11) that an order performs.
+struct Workitem {
+  std::string worklist;  // name of the PACS that has it
+  std::string uid;
+  std::string procedure;                // VALUE^SCHEME^MEANING
+  std::string transaction;              // secret UID with which the order claims it
+  bool claimed = false;                 // the worklist confirmed it
+  std::optional<OrderState> told = {};  // the last step that the worklist was told of
+  // The end of the order, which it enters when the worklist was told of it.
+  std::optional<OrderState> ending = {};
+
+  bool operator==(const Workitem&) const = default;
+};
+
 // Internal state of an order: in its record, never in a response.
 struct OrderWork {
   std::vector<std::string> listed;          // SOP Instance UIDs of the series, ascending
@@ -124,6 +138,8 @@ struct OrderWork {
   std::optional<std::string> confirmed = {};
   // The failures are forgotten once this step succeeds. Empty: there were none.
   std::optional<OrderState> failed_in = {};
+  std::optional<Workitem> workitem = {};
+  std::string segmented_series = {};  // of a segmentation: the series of its images, if known
 
   bool operator==(const OrderWork&) const = default;
 };

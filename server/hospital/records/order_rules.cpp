@@ -64,6 +64,16 @@ ReceivedFate fate_of(const LastOrder& last, const WatchedSeries& series, Time ne
   return is_over ? ReceivedFate::kDone : ReceivedFate::kNew;
 }
 
+bool end_at_worklist(OrderRecord& record, OrderState end) {
+  auto& workitem = record.work.workitem;
+  if (!workitem || workitem->ending || record.is_damaged) return false;
+  workitem->ending = end;
+  record.order.next_attempt.reset();
+  record.work.failures = 0;
+  record.work.begun = timestamp();  // telling the worklist has all the time again
+  return true;
+}
+
 void cancel_order(OrderRecord& record) {
   record.order.state = OrderState::kCancelled;
   record.order.finished = timestamp();
@@ -98,6 +108,10 @@ void begin_anew(OrderRecord& record) {
   work.identity.reset();
   work.blobs.clear();
   work.triangles.reset();
+  if (work.workitem) {
+    work.workitem->told.reset();
+    work.workitem->ending.reset();
+  }
 }
 
 }  // namespace isomesh::store

@@ -327,6 +327,12 @@ bool OrderStore::save(const OrderRecord& record, Time next) {
     if (is_final(known->order.state)) {
       return transaction.is_again() && known->order == record.order;
     }
+    // It was cancelled meanwhile.
+    const auto& workitem = known->work.workitem;
+    if (workitem && workitem->ending && record.work.workitem &&
+        workitem->ending != record.work.workitem->ending) {
+      return false;
+    }
     write(connection, record, database_.to_us(next));
     if (is_final(record.order.state)) tell_of_end(connection, record);
     transaction.commit();
@@ -352,6 +358,11 @@ CancelledOrder OrderStore::cancel(const Viewer& viewer, const std::string& id) {
     // The first attempt of this transaction may have cancelled it.
     if (is_final(record.order.state) && !record.is_damaged) {
       return {.order = record.order, .blobs = record.work.blobs};
+    }
+    if (end_at_worklist(record, OrderState::kCancelled)) {
+      write(connection, record);
+      transaction.commit();
+      return {.order = record.order, .blobs = {}};
     }
     const std::vector<std::string> blobs = named_blobs(connection, id);
     cancel_order(record);

@@ -62,6 +62,10 @@ enum class ReceivedFate {
   kDone,  // an order covered all instances, with their contents
 };
 
+// Lets an order that performs a workitem tell its worklist of that end before it ends. Returns
+// false if it performs none, or tells an end already.
+bool end_at_worklist(OrderRecord& record, OrderState end);
+
 struct OrderFilter {
   std::optional<OrderState> state = {};
   std::optional<std::string> rule = {};
@@ -122,7 +126,8 @@ class OrderStore {
   // Saves a step and the time of the next one. From now on the order names exactly the blobs of its
   // work; in a final state it names none. Entering a final state also adds its callback, in the
   // same transaction. Returns false, without changes, if the order is already in a final state
-  // because it was cancelled, or if another process carries out the orders now.
+  // because it was cancelled or is to be cancelled, or if another process carries out the orders
+  // now.
   virtual bool save(const OrderRecord& record, Time next);
 
   // The blobs that the order names.
@@ -131,7 +136,8 @@ class OrderStore {
   // Makes an open order due now.
   void hurry(const std::string& id);
 
-  // Cancels an open order; an ended one stays as it is. Throws Error kNotFound.
+  // Cancels an open order; an ended one stays as it is. One that performs a workitem stays open
+  // until it has told the worklist, unless it is cancelled again. Throws Error kNotFound.
   virtual CancelledOrder cancel(const Viewer& viewer, const std::string& id);
 
   // Restarts a failed order from its beginning. Throws Error kNotFound; kNotReady unless it has

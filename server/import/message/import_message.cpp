@@ -59,6 +59,10 @@ void visit(Is<PeersObject> auto& self, auto&& field) {
   field("series_description", self.series_description);
   field("instances", self.instances);
   field("failure", self.failure);
+  field("segmented_series", self.segmented_series);
+  field("workitem_state", self.workitem_state);
+  field("readiness", self.readiness);
+  field("procedures", self.procedures);
 }
 
 void visit(Is<PeersResponse> auto& self, auto&& field) {
@@ -84,7 +88,8 @@ constexpr const char* kError = "error";
 void check_uids(const PeersResponse& response) {
   for (const auto* objects : {&response.objects, &response.stored, &response.failed}) {
     for (const PeersObject& object : *objects) {
-      for (const std::string* uid : {&object.study, &object.series, &object.instance}) {
+      for (const std::string* uid :
+           {&object.study, &object.series, &object.instance, &object.segmented_series}) {
         if (!uid->empty() && !is_uid(*uid)) throw_malformed();
       }
     }

@@ -90,6 +90,12 @@ struct PeersObject {
   std::optional<std::uint32_t> instances = {};  // of the series
   // The reason why the PACS did not store an instance (PS3.18, I.2.2).
   std::optional<std::uint16_t> failure = {};
+  // Of the only series that a segmentation refers to.
+  std::string segmented_series = {};
+  // Of a workitem (PS3.4, CC.2.5): `study` and `series` are those of its only input.
+  std::string workitem_state = {};
+  std::string readiness = {};                // of the input
+  std::vector<std::string> procedures = {};  // codes, each VALUE^SCHEME^MEANING
 
   bool operator==(const PeersObject&) const = default;
 };

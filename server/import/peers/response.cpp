@@ -1,5 +1,6 @@
 #include "server/import/peers/response.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -18,6 +19,7 @@ namespace json = json_values;
 
 constexpr const char* kModality = "00080060";
 constexpr const char* kSeriesDescription = "0008103E";
+constexpr const char* kReferencedSeriesSequence = "00081115";
 constexpr const char* kReferencedSopInstanceUid = "00081155";
 constexpr const char* kFailureReason = "00081197";
 constexpr const char* kFailedSopSequence = "00081198";
@@ -27,6 +29,13 @@ constexpr const char* kPatientId = "00100020";
 constexpr const char* kStudyInstanceUid = "0020000D";
 constexpr const char* kSeriesInstanceUid = "0020000E";
 constexpr const char* kNumberOfSeriesRelatedInstances = "00201209";
+constexpr const char* kCodeValue = "00080100";
+constexpr const char* kCodingSchemeDesignator = "00080102";
+constexpr const char* kCodeMeaning = "00080104";
+constexpr const char* kScheduledWorkitemCodeSequence = "00404018";
+constexpr const char* kInputInformationSequence = "00404021";
+constexpr const char* kInputReadinessState = "00404041";
+constexpr const char* kProcedureStepState = "00741000";
 
 [[noreturn]] void throw_unreadable() {
   throw Error(ErrorCode::kInvalidParameter, "the response of the PACS is not DICOM JSON");
@@ -79,8 +88,38 @@ std::optional<Number> tag_number(const Json& object, const char* tag) {
   return static_cast<Number>(*number);
 }
 
-PeersObject found_object(const Json& object) {
-  if (!json::is_object(object)) throw_unreadable();
+// The items of a sequence that are objects.
+std::vector<const Json*> items_of(const Json& object, const char* sequence) {
+  constexpr std::size_t kMost = 100;
+  std::vector<const Json*> items;
+  if (tag_value(object, sequence) == nullptr) return items;
+  const Json& values = *json::find(*json::find(object, sequence), "Value");
+  for (std::size_t at = 0; at < std::min(json::array_size(values), kMost); ++at) {
+    if (json::is_object(json::element(values, at))) items.push_back(&json::element(values, at));
+  }
+  return items;
+}
+
+std::string without_carets(std::string text) {
+  std::ranges::replace(text, '^', ' ');
+  return text;
+}
+
+void read_workitem(const Json& object, PeersObject& found) {
+  found.workitem_state = tag_text(object, kProcedureStepState);
+  if (found.workitem_state.empty()) return;
+  found.readiness = tag_text(object, kInputReadinessState);
+  for (const Json* code : items_of(object, kScheduledWorkitemCodeSequence)) {
+    found.procedures.push_back(without_carets(tag_text(*code, kCodeValue)) + '^' +
+                               without_carets(tag_text(*code, kCodingSchemeDesignator)) + '^' +
+                               without_carets(tag_text(*code, kCodeMeaning)));
+  }
+  const auto inputs = items_of(object, kInputInformationSequence);
+  found.study = inputs.size() == 1 ? uid_of(*inputs.front(), kStudyInstanceUid) : "";
+  found.series = inputs.size() == 1 ? uid_of(*inputs.front(), kSeriesInstanceUid) : "";
+}
+
+PeersObject described_object(const Json& object) {
   return {.study = uid_of(object, kStudyInstanceUid),
           .series = uid_of(object, kSeriesInstanceUid),
           .instance = uid_of(object, kSopInstanceUid),
@@ -88,6 +127,15 @@ PeersObject found_object(const Json& object) {
           .modality = tag_text(object, kModality),
           .series_description = tag_text(object, kSeriesDescription),
           .instances = tag_number<std::uint32_t>(object, kNumberOfSeriesRelatedInstances)};
+}
+
+PeersObject found_object(const Json& object) {
+  if (!json::is_object(object)) throw_unreadable();
+  PeersObject found = described_object(object);
+  const auto series = items_of(object, kReferencedSeriesSequence);
+  if (series.size() == 1) found.segmented_series = uid_of(*series.front(), kSeriesInstanceUid);
+  read_workitem(object, found);
+  return found;
 }
 
 std::vector<PeersObject> referenced(const Json& response, const char* sequence) {
@@ -115,6 +163,8 @@ PeersResponse read_response(const std::filesystem::path& file) {
     for (std::size_t at = 0; at < json::array_size(root); ++at) {
       response.objects.push_back(found_object(json::element(root, at)));
     }
+  } else if (json::is_object(root) && tag_value(root, kProcedureStepState) != nullptr) {
+    response.objects = {found_object(root)};
   } else if (json::is_object(root)) {
     response.stored = referenced(root, kReferencedSopSequence);
     response.failed = referenced(root, kFailedSopSequence);

@@ -153,6 +153,11 @@ class FakePacs : public Archive, public ObjectReceiver {
     const Lock lock(mutex_);
     return !is_unlisted && stored_.contains(place.instance);
   }
+  std::string segmented_series(const std::string&, const std::string&,
+                               const std::stop_token& stop) override {
+    answer(stop);
+    return "1.7.7";
+  }
   void store(const OutgoingObject& object, const std::stop_token& stop) override {
     answer(stop);
     ++stores;

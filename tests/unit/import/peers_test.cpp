@@ -136,6 +136,40 @@ TEST(Answer, OfASearchIsAListOfObjects) {
   EXPECT_THAT(answer_of("[]").objects, IsEmpty());
 }
 
+TEST(Answer, OfAWorklistTellsInputsAndProcedures) {
+  const std::string input = R"({"0020000D": {"Value": ["1.2"]}, "0020000E": {"Value": ["1.3"]}})";
+  const auto item = [&](const std::string& inputs) {
+    return answer_of(R"({"00080018": {"Value": ["1.1"]}, "00741000": {"Value": ["SCHEDULED"]},
+      "0020000D": {"Value": ["1.9"]}, "00404041": {"Value": ["READY"]},
+      "00404018": {"Value": [{"00080100": {"Value": ["M^1"]}, "00080102": {"Value": ["99X"]}}, 7]},
+      "00404021": {"Value": [)" +
+                     inputs + "]}}")
+        .objects.at(0);
+  };
+  const PeersObject found = item(input);
+  EXPECT_EQ(found.instance, "1.1");
+  EXPECT_EQ(found.workitem_state, "SCHEDULED");
+  EXPECT_EQ(found.readiness, "READY");
+  EXPECT_EQ(found.study, "1.2");
+  EXPECT_EQ(found.series, "1.3");
+  EXPECT_THAT(found.procedures, ElementsAre("M 1^99X^"));
+  for (const std::string& other : {std::string(), input + ", " + input, std::string("{}")}) {
+    EXPECT_EQ(item(other).study, "") << other;
+  }
+}
+
+TEST(Answer, OfMetadataTellsTheSegmentedSeries) {
+  const std::string series = R"({"0020000E": {"Value": ["1.3"]}})";
+  const auto segmented = [](const std::string& items) {
+    return answer_of(R"([{"00081115": {"Value": [)" + items + "]}}]")
+        .objects.at(0)
+        .segmented_series;
+  };
+  EXPECT_EQ(segmented(series), "1.3");
+  EXPECT_EQ(segmented(series + ", " + series), "");
+  EXPECT_EQ(segmented(""), "");
+}
+
 // Values of images are read without these spaces, too, and both are compared.
 TEST(Answer, IsWithoutSpacesAroundValues) {
   const auto answer = answer_of(
