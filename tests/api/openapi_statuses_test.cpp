@@ -234,6 +234,8 @@ void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
   statuses.probe("GET /metrics", "/metrics?x=1");
   statuses.probe("GET /version", "/version");
   statuses.probe("GET /version", "/version?no=1");
+  statuses.probe("GET /login", "/login");
+  statuses.probe("GET /login", "/login?no=1");
   statuses.probe("GET /openapi.yaml", "/openapi.yaml");
   for (const std::string path : {"/", "/client.js"}) {
     statuses.probe("GET " + path, path);
