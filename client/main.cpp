@@ -17,6 +17,7 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/options.h"
 #include "client/mcp/command.h"
+#include "client/platforms/command.h"
 #include "server/hospital/command/orders.h"
 
 namespace {
@@ -108,7 +109,9 @@ int main(int argc, char** argv) {
   int status = kRefused;
   try {
     Added added = order_commands();
-    for (AddedCommand& each : mcp_commands().commands) added.commands.push_back(std::move(each));
+    for (Added more : {mcp_commands(), platform_commands()}) {
+      for (AddedCommand& each : more.commands) added.commands.push_back(std::move(each));
+    }
     status = run(parse_options(argc, argv, added), interrupt.token());
   } catch (const EarlyExit& exit) {
     (exit.status() == 0 ? std::cout : std::cerr) << exit.what();

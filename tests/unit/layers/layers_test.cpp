@@ -90,7 +90,8 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/hospital/client", {"client/isomesh", "server/hospital/protocol"}},
     {"server/hospital/command", {"client/cli", "server/hospital/client"}},
     {"client/mcp", {"client/cli"}},
-    {"client", {"server/hospital/command", "client/mcp"}},
+    {"client/platforms", {"client/cli"}},
+    {"client", {"server/hospital/command", "client/mcp", "client/platforms"}},
     {"client/verify", {"client/isomesh", "server/import/message"}},
     {"client/kernels", {"server/jobs/making", "server/import/source"}},
 };
