@@ -1,5 +1,6 @@
 """Meshes that are made in this process, and the package that does it, which the build has put together."""
 
+import multiprocessing
 import os
 import re
 import shutil
@@ -204,6 +205,12 @@ except KeyboardInterrupt:
         self.assertEqual(program.stdout.readline(), "begun\n")
         program.send_signal(signal.SIGINT)
         self.assertEqual(program.communicate()[0].splitlines()[-1], "interrupted True")
+
+    def test_a_forked_process_is_told(self):
+        """The threads of the kernels do not exist there: it would wait for them for ever."""
+        isomesh_kernels.mesh(ball(), iso=-9)
+        with multiprocessing.get_context("fork").Pool(1) as pool, self.assertRaisesRegex(RuntimeError, 'get_context."spawn"'):
+            pool.apply(isomesh_kernels.mesh, [ball()], {"iso": -9})
 
     def test_an_exception_of_progress_ends_it(self):
         def fail(_):

@@ -7,7 +7,7 @@ import json
 import os
 import weakref
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Callable, List, Mapping, Optional, Tuple
 
 import numpy
 
@@ -65,6 +65,7 @@ def _loaded() -> Any:
 
 
 _library = _loaded()
+_used_by: List[int] = []  # the process whose threads make the meshes, once there are any
 
 
 class Run:
@@ -73,6 +74,12 @@ class Run:
     def __init__(
         self, samples: Any, raw: Raw, left_out: int, is_ct: bool, memory_bytes: int, parameters: Mapping[str, Any]
     ) -> None:
+        if _used_by not in ([], [os.getpid()]):
+            raise RuntimeError(
+                "isomesh_kernels had made a mesh before this process was forked, so its threads are missing here; "
+                'start processes with multiprocessing.get_context("spawn")'
+            )
+        _used_by[:] = [os.getpid()]
         volume = _Volume(
             samples.ctypes.data,
             raw.type.encode(),
