@@ -40,9 +40,10 @@ std::vector<float> flat_series(int degree, double time) {
 void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>& shares,
             std::span<const float> series, const Context& context, WallShape& shape) {
   Buffer<Lanes> first;
-  Buffer<Lanes> before;  // T[j - 2], then T[j]
-  Buffer<Lanes> now;     // T[j - 1]
-  for (Buffer<Lanes>* const each : {&first, &before, &now}) {
+  Buffer<Lanes> before;                          // T[j - 2], then T[j]
+  Buffer<Lanes> now;                             // T[j - 1]
+  first.resize_for_overwrite(shape.vertices());  // only of those that move
+  for (Buffer<Lanes>* const each : {&before, &now}) {
     each->resize_for_overwrite(shape.vertices());
     for_chunks(context, shape.vertices(), [&](std::size_t begin, std::size_t end) {
       std::copy(shape.at.begin() + begin, shape.at.begin() + end, each->begin() + begin);
@@ -53,6 +54,7 @@ void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>
       const std::size_t v = vertices[i];
       const Lanes step = shape.kept(v, shares[v] * (shape.mean(v, now) - now[v]));
       const Lanes moved = now[v] + step;
+      if (j == 1) first[v] = now[v];
       before[v] = j == 1 ? moved : 2.0F * moved - before[v];
       shape.at[v] += series[j] * (before[v] - first[v]);  // the sum of all is 1
     });

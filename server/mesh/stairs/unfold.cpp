@@ -18,15 +18,43 @@ struct WallNormals {
   Buffer<Lanes> near;  // its own and its neighbours'
 };
 
-WallNormals normals_of(const WallShape& shape, const Context& context) {
+Lanes normal_of(const WallShape& shape, const std::array<std::uint32_t, 3>& corners) {
+  return cross(shape.at[corners[1]] - shape.at[corners[0]],
+               shape.at[corners[2]] - shape.at[corners[0]]);
+}
+
+// True if the cosine of the angle between two vectors is less than `cosine`, which is not negative.
+bool is_less(Lanes a, Lanes b, float cosine) {
+  const float product = dot(a, b);
+  return product < 0 || product * product < cosine * cosine * dot(a, a) * dot(b, b);
+}
+
+// A triangle that lies away from the normal of a fan that it is in.
+struct Candidate {
+  std::uint32_t fan = 0;
+  Spoke spoke;
+};
+
+// If the triangle is away from the sum of its corners' own normals, it is away from one of them.
+constexpr float kSuspect = 0.7F;
+
+// Also lists the candidates, by chunk of fans.
+WallNormals normals_of(const WallShape& shape, const Context& context,
+                       std::vector<std::vector<Candidate>>& candidates) {
   const WallFans& fans = shape.fans();
   WallNormals normals;
   normals.own.resize_for_overwrite(fans.size());
   normals.near.resize_for_overwrite(fans.size());
+  candidates.resize(chunks_of(fans.size()));
   for_each(context, fans.size(), [&](std::size_t fan) {
+    const std::size_t v = fans.vertex(fan);
     Lanes sum = {};
-    for (const Spoke& spoke : fans.spokes(fan)) sum += shape.normal(fans.vertex(fan), spoke);
+    for (const Spoke& spoke : fans.spokes(fan)) sum += shape.normal(v, spoke);
     normals.own[fan] = sum;
+    for (const Spoke& spoke : fans.spokes(fan)) {
+      if (!is_less(shape.normal(v, spoke), sum, kSuspect)) continue;
+      candidates[fan / kChunk].push_back({static_cast<std::uint32_t>(fan), spoke});
+    }
   });
   for_each(context, fans.size(), [&](std::size_t fan) {
     Lanes sum = normals.own[fan];
@@ -36,38 +64,36 @@ WallNormals normals_of(const WallShape& shape, const Context& context) {
   return normals;
 }
 
-Lanes normal_of(const WallShape& shape, const std::array<std::uint32_t, 3>& corners) {
-  return cross(shape.at[corners[1]] - shape.at[corners[0]],
-               shape.at[corners[2]] - shape.at[corners[0]]);
-}
-
-// True if the cosine of the angle between two vectors is less than `cosine`.
-bool is_less(Lanes a, Lanes b, float cosine) { return dot(a, b) < cosine * length(a) * length(b); }
-
 // The triangles that may be folded: those that lie away from their corners' own normals.
 std::vector<Suspect> find_suspects(const WallShape& shape, const Context& context) {
-  constexpr float kSuspect = 0.7F;
-  const WallNormals normals = normals_of(shape, context);
+  std::vector<std::vector<Candidate>> candidates;
+  const WallNormals normals = normals_of(shape, context, candidates);
   const WallFans& fans = shape.fans();
-  std::vector<std::vector<Suspect>> found(chunks_of(shape.vertices()));
-  for_each(context, shape.vertices(), [&](std::size_t v) {
-    shape.visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
-      // Each triangle once, at its first corner.
-      if (spoke.next < v || spoke.previous < v) return;
-      const std::array corners = {static_cast<std::uint32_t>(v), spoke.next, spoke.previous};
-      const Wall& wall = fans.wall(fan);
-      const std::array own = {static_cast<std::uint32_t>(fan), fans.find(spoke.next, wall),
-                              fans.find(spoke.previous, wall)};
-      Lanes near = {};
-      for (const std::uint32_t each : own) near += normals.own[each];
-      if (!is_less(normal_of(shape, corners), near, kSuspect)) return;
-      Lanes wide = {};
-      for (const std::uint32_t each : own) {  // of all within two edges
-        wide += normals.near[each];
-        fans.neighbors().visit(each, [&](std::uint32_t next) { wide += normals.near[next]; });
-      }
-      found[v / kChunk].push_back({corners, wide});
-    });
+  std::vector<std::vector<Suspect>> found(candidates.size());
+  const auto look_at = [&](const Candidate& candidate, std::vector<Suspect>& suspects) {
+    const std::uint32_t v = fans.vertex(candidate.fan);
+    const auto& [next, previous] = candidate.spoke;
+    const Wall& wall = fans.wall(candidate.fan);
+    const std::array corners = {v, next, previous};
+    const std::array own = {candidate.fan, fans.find(next, wall), fans.find(previous, wall)};
+    const Lanes normal = normal_of(shape, corners);
+    Lanes near = {};
+    for (std::size_t i = 0; i < 3; ++i) {
+      near += normals.own[own[i]];
+      // Each triangle once, at the first of the corners that it is a candidate of.
+      const bool is_before = corners[i] < v;
+      if (is_before && is_less(normal, normals.own[own[i]], kSuspect)) return;
+    }
+    if (!is_less(normal, near, kSuspect)) return;
+    Lanes wide = {};
+    for (const std::uint32_t each : own) {  // of all within two edges
+      wide += normals.near[each];
+      fans.neighbors().visit(each, [&](std::uint32_t other) { wide += normals.near[other]; });
+    }
+    suspects.push_back({corners, wide});
+  };
+  parallel_for(context, candidates.size(), [&](std::size_t chunk) {
+    for (const Candidate& each : candidates[chunk]) look_at(each, found[chunk]);
   });
   std::vector<Suspect> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

@@ -117,7 +117,7 @@ Buffer<float> VolumeKeeper::offsets(const WallShape& shape, Buffer<Lanes>& norma
   constexpr float kLeastFacing = 0.3F;
   // Up to this share of it the area is taken for that at the start. Labels of a few voxels grow
   // more, and by that area they would shrink by too much in turn.
-  constexpr float kAlike = 0.6F;
+  constexpr float kAlike = 0.65F;
   const WallFans& fans = shape.fans();
   Buffer<float> offsets = all_fans();
   Buffer<float> areas = all_fans();
