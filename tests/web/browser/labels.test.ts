@@ -332,7 +332,7 @@ describe('the surfaces of labels', () => {
     const label = made.mesh?.labels?.find((one) => one.label === 1);
 
     const one = page.waitForEvent('download');
-    await page.getByRole('button', { name: 'Download Right half as STL' }).click();
+    await page.getByLabel('Save Right half as').selectOption('STL');
     const stl = readFileSync(await (await one).path());
     expect(stl.length).toBe(84 + 50 * (label?.triangles ?? 0));
 
@@ -340,5 +340,38 @@ describe('the surfaces of labels', () => {
     await page.locator('.downloads [data-format=zip]').click();
     const zip = readFileSync(await (await whole).path());
     expect(createHash('sha256').update(zip).digest('hex')).toBe(made.mesh?.files.zip?.sha256);
+  });
+
+  it('are saved, one or those that are shown, in a format that the job did not make', async ({ page }) => {
+    await open();
+    const address = page.url();
+    const saved = async (choose: () => Promise<unknown>): Promise<{ name: string; text: string }> => {
+      const saving = page.waitForEvent('download');
+      await choose();
+      const file = await saving;
+      return { name: file.suggestedFilename(), text: readFileSync(await file.path()).toString('latin1') };
+    };
+    const one = await saved(() => page.getByLabel('Save Left half as').selectOption('OFF'));
+    expect(one.name).toMatch(/-2\.[a-z]+$/);
+    const label = made.mesh?.labels?.find(({ label: number }) => number === 2);
+    expect(one.text.slice(0, 200)).toMatch(new RegExp(`^(OFF)\\s+\\d+ ${label?.triangles}\\b`));
+    await page.getByRole('checkbox', { name: 'Show Left half' }).uncheck();
+    const shown = await saved(() => page.getByLabel('Save what is shown as').selectOption('OBJ'));
+    expect(shown.name).toMatch(/2-labels\.obj$/);
+    expect((shown.text.match(/^o .*$/gm) ?? []).length).toBe(2);
+    expect(page.url().split('?')[0]).toBe(address.split('?')[0]);
+  });
+
+  it('are listed with those that they touch, by the areas of their walls', async ({ page, daemon }) => {
+    const { walls } = await daemon.json<{ walls: { a: number; b: number | null; area_mm2: number }[] }>(`/v1/jobs/${made.id}/walls`);
+    await open();
+    await page.getByText('Who touches whom').click();
+    const rows = page.locator('.walls tbody tr');
+    await expect.poll(() => rows.count()).toBe(walls.length);
+    const areas = (await rows.locator('td.number').allInnerTexts()).map((text) => Number(text.replace(/[^\d.]|mm.*/g, '')));
+    expect(areas).toEqual([...areas].sort((a, b) => b - a));
+    await page.getByLabel('Search the labels').fill('left');
+    await expect.poll(() => rows.count()).toBe(walls.filter(({ a, b }) => a === 2 || b === 2).length);
+    await expect.poll(() => rows.filter({ hasText: 'Right half' }).innerText()).toMatch(/^Right half\s+Left half\s+\d+/);
   });
 });

@@ -1,11 +1,14 @@
 // Other jobs from one: the same surface with changes, where its parameters are chosen, what its files are called.
 import { client } from '../client';
-import type { Job, JobParameters, Volume } from '../api/types';
-import { shortId } from '../ui/format';
+import { errorOfProblem } from '../api/problem';
+import type { Job, JobParameters, Label, MeshFormat, Volume } from '../api/types';
+import { meshFileSuffix, meshFormatTitle, shortId } from '../ui/format';
 import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
+import { saveFile } from '../ui/save';
 import { fileStem } from '../volume/names';
-import { defaultParameters, jobRequest, queryOfParameters, surfaceInNames, surfaceInWords, variantOf } from './parameters';
+import { labelsOfMesh } from './labels';
+import { defaultParameters, jobRequest, queryOfParameters, surfaceInNames, surfaceInWords, variantOf, withGlb } from './parameters';
 import { forPrinting } from './printing';
 
 // Makes the same surface with other parameters, or finds it made already.
@@ -28,6 +31,26 @@ export type MakeVariant = (variant: Partial<JobParameters>) => void;
 // Starts a job with these changes and goes to it.
 export function makeVariant(job: Job): MakeVariant {
   return (variant) => void submitVariant(job, variant).then(started, tellError);
+}
+
+// Saves the same surface with these changes in that format; a job makes the file first. `label` is one of several whose files are
+// apart in that format.
+export async function saveVariant(job: Job, volume: Volume | null, format: MeshFormat, change: Partial<JobParameters> = {}, label: Label | null = null): Promise<void> {
+  const title = meshFormatTitle(format);
+  tell(`Making ${title}. It is saved when it is ready.`);
+  try {
+    const { id } = await submitVariant(job, { ...change, formats: withGlb([format]) });
+    const made = await client.follow(id);
+    if (made.error) throw errorOfProblem(made.error);
+    const own = label !== null && (await labelsOfMesh(made)).find((one) => one.label === label)?.files?.[format];
+    const whole = made.mesh?.files[format];
+    const file = own || whole || made.mesh?.files.zip;
+    if (!file) throw new Error(`The job was cancelled before it made ${title}.`);
+    const suffix = `${own ? `-${label}` : ''}.${meshFileSuffix(own || whole ? format : 'zip')}`;
+    await saveFile(file.href, fileNameOf(made, volume, suffix), file.bytes);
+  } catch (error) {
+    tellError(error);
+  }
 }
 
 // Asks first. Resolves with true once the job and its files are erased.

@@ -1,12 +1,12 @@
 // The panel beside a surface: its numbers, timings, files, and links to make others.
 import { token } from '../../client';
-import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
+import type { Job, JobParameters, MeshSummary, Volume } from '../../api/types';
 import { changeOf, type Change } from '../../job/changes';
 import { labelTitle } from '../../job/labels';
-import { isSameJob, surfaceInWords, variantOf, withGlb } from '../../job/parameters';
+import { isSameJob, surfaceInWords, variantOf } from '../../job/parameters';
 import { commandSnippet, curlSnippet, javascriptSnippet, librarySnippet, pythonSnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
-import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
+import { fileNameOf, makeVariant, saveVariant, submitVariant } from '../../job/variants';
 import { button, definitions, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatIso, formatNumber, formatSize, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tell, tellError } from '../../ui/notices';
@@ -133,15 +133,6 @@ export function downloads(job: Job, volume: Volume | null, onReport: () => void)
   const files = job.mesh?.files ?? {};
   const name = (format: string): string => fileNameOf(job, volume, `.${meshFileSuffix(format)}`);
   const missing = meshFormats.filter((format) => !job.parameters.formats.includes(format));
-  const make = async (format: MeshFormat): Promise<void> => {
-    try {
-      const variant = await submitVariant(job, { formats: withGlb([...job.parameters.formats, format]) });
-      tell(`A new job was started. It also makes ${meshFormatTitle(format)}.`);
-      go(['jobs', variant.id]);
-    } catch (error) {
-      tellError(error);
-    }
-  };
   return section(
     'Download',
     h('div.downloads', [
@@ -166,9 +157,9 @@ export function downloads(job: Job, volume: Volume | null, onReport: () => void)
     ]),
     missing.length > 0 &&
       h('div.make', [
-        h('span.faint', 'Also make:'),
+        h('span.faint', 'Make and save:'),
         ...missing.map((format) =>
-          button(meshFormatTitle(format), () => void make(format), { class: 'chip' }),
+          button(meshFormatTitle(format), () => void saveVariant(job, volume, format), { class: 'chip' }),
         ),
       ]),
     h('div.actions', button('Report', onReport, { title: 'One sheet to print or to keep: pictures, numbers, proof, versions, hashes' })),

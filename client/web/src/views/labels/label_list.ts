@@ -1,14 +1,16 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
-import type { Job, LabelSummary, Volume, Label } from '../../api/types';
+import type { Job, LabelSummary, MeshFormat, Volume, Label } from '../../api/types';
 import { labelOrders, labelsCsv, labelTitle, type LabelOrder, type LabelState } from '../../job/labels';
-import { fileNameOf, makeVariant } from '../../job/variants';
+import { holdsAllLabels, meshFormats } from '../../job/table';
+import { fileNameOf, makeVariant, saveVariant } from '../../job/variants';
 import { button, checkbox, h, select } from '../../ui/dom';
-import { formatBytes, formatCount, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
+import { formatCount, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { saveBlob, saveFile } from '../../ui/save';
 import type { Scope } from '../../ui/signal';
 import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
+import { wallTable } from './wall_table';
 
 // Unless a label is closed and oriented, the sum over its triangles is no volume.
 export function volumeText({ closed, oriented, volume_mm3: volume }: LabelSummary): string {
@@ -56,11 +58,16 @@ export class LabelList {
           (name) => search.sort(labelOrders[name][1]),
           { 'aria-label': 'Order of the labels' },
         ),
+        this.saveAs('Save what is shown as', (format) => {
+          const file = state.hidden.value.size === 0 ? job.mesh?.files[format] : undefined;
+          if (file) void saveFile(file.href, fileNameOf(job, volume, `.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
+          else void saveVariant(job, volume, format, { labels: this.shown });
+        }),
         button('Make what is shown', () => makeVariant(job)({ labels: this.shown }), { title: 'Starts a job of the labels that are shown, in all its formats' }),
         button('Save as CSV', () => this.saveTable(search.found), { title: 'Saves a table of the labels that are found: voxels, volumes, areas, components' }),
       ]),
     ]);
-    this.element.append(opacityControl());
+    this.element.append(opacityControl(), ...wallTable(scope, job, search));
     search.fill();
     scope.onEnd(state.hidden.subscribe(() => this.update()));
     scope.onEnd(state.colours.subscribe(() => this.update()));
@@ -106,7 +113,7 @@ export class LabelList {
           h('span.faint', `${formatCount(label.components)} ${label.components === 1 ? 'component' : 'components'}, ${formatCount(label.triangles)} triangles`),
         ]),
         alone,
-        ...this.downloads(label, title),
+        this.download(label, title),
       ]),
       shown,
       colour,
@@ -122,14 +129,24 @@ export class LabelList {
     saveBlob(new Blob([text], { type: 'text/csv' }), fileNameOf(this.job, this.volume, '-labels.csv'));
   }
 
-  private downloads(label: LabelSummary, title: string): HTMLElement[] {
-    return Object.entries(label.files ?? {}).map(([format, { bytes, href }]) =>
-      button(
-        meshFormatTitle(format),
-        () => void saveFile(href, fileNameOf(this.job, this.volume, `-${label.label}.${meshFileSuffix(format)}`), bytes).catch(tellError),
-        { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${meshFormatTitle(format)}` },
-      ),
-    );
+  // A choice of all formats.
+  private saveAs(title: string, onFormat: (format: MeshFormat) => void): HTMLSelectElement {
+    const element: HTMLSelectElement = select([['', title], ...meshFormats.map((format) => [format, meshFormatTitle(format)] as const)], '', (format) => {
+      element.value = '';
+      if (format !== '') onFormat(format);
+    }, { 'aria-label': title });
+    return element;
+  }
+
+  private download({ label, files = {} }: LabelSummary, title: string): HTMLElement {
+    const element = this.saveAs('Save', (format) => {
+      const file = files[format];
+      if (file) void saveFile(file.href, fileNameOf(this.job, this.volume, `-${label}.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
+      // Where each label has a file of its own, its surface is the one that is seen, with its walls to the others.
+      else void saveVariant(this.job, this.volume, format, holdsAllLabels(format) ? { labels: [label] } : {}, label);
+    });
+    element.setAttribute('aria-label', `Save ${title} as`);
+    return element;
   }
 
   private update(): void {
