@@ -29,7 +29,7 @@
 #include "proto/types.h"
 #include "server/codec/label_titles.h"
 #include "server/import/source/ct_presets.h"
-#include "server/jobs/making/defaults.h"
+#include "server/jobs/library/defaults.h"
 #include "server/jobs/making/make_mesh.h"
 #include "server/jobs/making/make_samples.h"
 #include "server/jobs/making/sample_array.h"

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "proto/types.h"
+#include "server/jobs/library/defaults.h"
 #include "server/jobs/library/label_lists.h"
-#include "server/jobs/making/defaults.h"
 #include "server/store/job_store.h"
 
 namespace isomesh::jobs {

@@ -43,8 +43,7 @@ MadeLabels make_from_samples(const SampleArray& samples, const MeshRequest& requ
   if (request.parameters.labels) {
     return make_labels(cropped.array(), own, sinks, progress, workspace.walls);
   }
-  return {.summary = make_mesh(cropped.array(), own, sinks, progress, workspace.mesh),
-          .walls = {}};
+  return {.summary = make_mesh(cropped.array(), own, sinks, progress, workspace.mesh), .walls = {}};
 }
 
 }  // namespace isomesh::jobs

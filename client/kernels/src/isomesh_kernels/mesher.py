@@ -116,8 +116,8 @@ class Mesher:
         error = float(self.resolution.min()) if max_error is None else float(max_error)
         made = self._simplified(reduction_factor, error if reduction_factor else 0.0)
         # Labels are ascending, and each has vertices of its own, in the same order.
-        begin, end = numpy.searchsorted(made.labels, [self._faces[label], self._faces[label] + 1])
-        faces = made.faces[begin:end]
+        places: Any = numpy.searchsorted(made.labels, [self._faces[label], self._faces[label] + 1])
+        faces = made.faces[slice(*places)]
         first, last = (int(faces.min()), int(faces.max()) + 1) if len(faces) else (0, 0)
         vertices = made.vertices[first:last] + (self.resolution / 2 if voxel_centered else numpy.float32(0))
         return LabelMesh(vertices, faces - numpy.uint32(first))

@@ -150,7 +150,7 @@ def _narrow(labels: Any) -> Any:
     """The type that labels of the service have: int32, or uint32 or int64 if they need it."""
     low, high = (int(labels.min()), int(labels.max())) if len(labels) else (0, 0)
     for name in ("int32", "uint32"):
-        limits = numpy.iinfo(name)
+        limits: Any = numpy.iinfo(name)
         if limits.min <= low and high <= limits.max:
             return labels.astype(name)
     return labels

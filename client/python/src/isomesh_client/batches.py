@@ -73,6 +73,7 @@ class Batches:
         progress: Union[bool, Callable[[Result], object]] = False,
         spacing: Optional[Sequence[float]] = None,
         accept: Sequence[str] = (),
+        masks: bool = False,
         nifti_form: str = "",
         modality: str = "",
         # `generate` writes these lines: the parameters of a job.
@@ -110,7 +111,7 @@ class Batches:
         """
         keywords = locals()
         parameters = given(keywords)
-        of_upload = {each: keywords[each] for each in ("accept", "nifti_form", "modality") if keywords[each]}
+        of_upload = {each: keywords[each] for each in ("accept", "masks", "nifti_form", "modality") if keywords[each]}
         if spacing is not None:
             of_upload["spacing"] = spacing
         if isinstance(sources, (str, bytes, os.PathLike)):

@@ -83,6 +83,7 @@ class Client(Batches):
         name: str = "",
         series: str = "",
         member: str = "",
+        masks: bool = False,
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
@@ -140,6 +141,7 @@ class Client(Batches):
         name: str = "",
         series: str = "",
         member: str = "",
+        masks: bool = False,
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
@@ -157,6 +159,8 @@ class Client(Batches):
                   samples along each axis. An array with neither has 1 mm, as raw samples have
         raw       for a path or bytes: describes them as raw samples
         name      the volume's name. Default: the name of the file or of its series
+        masks     True says that the files of a folder or list are masks of one structure each. They become
+                  one volume of labels with the files' names; `mesh` then makes all, unless `labels` is given
         modality  "ct" says that the samples are Hounsfield units, if the file does not say so. The volume
                   then has the presets of a CT, such as iso="bone"
 
@@ -386,6 +390,8 @@ class Client(Batches):
         self, source: Any, of_upload: Mapping[str, Any], parameters: Mapping[str, Any], progress: Optional[Progress]
     ) -> Tuple[api.Volume, api.SucceededJob]:
         """The volume of a source, which is uploaded if needed, and its job, which has succeeded."""
+        if of_upload.get("masks") and "iso" not in parameters:
+            parameters = {"labels": "all", **parameters}
         stored = self._stored(source, of_upload)
         if stored is None:
             stored = self._upload_one(source, "labels" in parameters, of_upload)
@@ -426,6 +432,7 @@ class Client(Batches):
         chosen = {
             "series": get("series", ""),
             "member": get("member", ""),
+            "masks": "true" if get("masks", False) else "",
             "volume": "" if number is None else str(int(number)),
             "accept": ",".join(get("accept", ())),
             "nifti_form": get("nifti_form", ""),
@@ -461,13 +468,16 @@ class Client(Batches):
         return Mesh(**ply.parse(data), job=job, notes=notes, download=self.download)
 
 
-_UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form", "modality")
+_UPLOAD_KEYWORDS = (
+    *("affine", "spacing", "raw", "name"),
+    *("series", "member", "masks", "volume", "accept", "nifti_form", "modality"),
+)
 
 
 def _is_empty(keyword: str, value: Any) -> bool:
     """True for a keyword's default. An empty place is no default but an error."""
     is_place = keyword in ("affine", "spacing")
-    return value is None or not is_place and isinstance(value, (str, tuple, list)) and not value
+    return value is None or value is False or not is_place and isinstance(value, (str, tuple, list)) and not value
 
 
 def _id_of(thing: Any) -> str:

@@ -27,6 +27,14 @@ export class CoarseMaker {
     this.start();
   }
 
+  // These blocks are all there are now.
+  restart(blocks: { surface: number; block: Block }[]): void {
+    const isWanted = this.isWanted;
+    this.dispose();
+    Object.assign(this, { waiting: blocks, taken: 0, made: 0, isBusy: false, isWanted });
+    this.start();
+  }
+
   want(): void {
     this.isWanted = true;
     this.start();
@@ -53,6 +61,7 @@ export class CoarseMaker {
   private startWorker(): Worker {
     const worker = new Worker(new URL('../mesh/coarse.worker.ts', import.meta.url), { type: 'module' });
     worker.onmessage = ({ data }: MessageEvent<CoarseAnswer>) => {
+      if (worker !== this.worker) return;
       this.isBusy = false;
       if (data) this.onMade(data);
       this.next();
@@ -72,7 +81,10 @@ export class CoarseMaker {
     } else if (this.taken > this.made && (this.isWhole || this.taken >= growth * this.made)) {
       this.made = this.taken;
       this.ask({ most: this.most });
-    } else if (this.isWhole) this.dispose();
+    } else if (this.isWhole && this.taken > 0) {
+      this.worker?.terminate();
+      this.worker = null;
+    }
   }
 
   private ask(request: CoarseRequest): void {

@@ -1,5 +1,6 @@
-// What surfaces are drawn with.
-import { BackSide, DoubleSide, FrontSide, MeshPhongMaterial } from 'three';
+// What surfaces are drawn with: materials and geometries.
+import { BackSide, BufferAttribute, BufferGeometry, DoubleSide, FrontSide, MeshPhongMaterial } from 'three';
+import type { Coarse } from '../mesh/coarse';
 
 export const neutral = '#dcd6c8';
 
@@ -17,4 +18,13 @@ export function labelMaterials(colour: string): MeshPhongMaterial[] {
   back.polygonOffsetFactor = 2;
   back.polygonOffsetUnits = 2;
   return [front, back];
+}
+
+export function geometryOf({ positions, normals, distances }: Omit<Coarse, 'index'>, index: Uint16Array | Uint32Array): BufferGeometry {
+  const made = new BufferGeometry();
+  made.setAttribute('position', new BufferAttribute(positions, 3));
+  made.setAttribute('normal', new BufferAttribute(normals, 4, true));
+  if (distances) made.setAttribute('distanceMm', new BufferAttribute(distances, 1));
+  made.setIndex(new BufferAttribute(index, 1));
+  return made;
 }

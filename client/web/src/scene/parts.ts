@@ -4,7 +4,7 @@ import {
   BackSide,
   Box3,
   BufferAttribute,
-  BufferGeometry,
+  type BufferGeometry,
   Mesh,
   type MeshPhongMaterial,
   type Object3D,
@@ -19,7 +19,7 @@ import type { Coarse } from '../mesh/coarse';
 import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
-import { labelMaterials, material, neutral } from './materials';
+import { geometryOf, labelMaterials, material, neutral } from './materials';
 import { firstMet, type Interval } from './pick';
 import { placeholder } from './placeholder';
 import { defaultStyle, type SurfaceStyle } from './style';
@@ -30,9 +30,9 @@ export interface Hit {
   at: number; // along the ray
   label: Label | null;
   distance?: number; // where the surface has distances
-  // Which of the finest blocks, and the first corner of the triangle in its index; of a coarse level, -1.
+  // Which of the finest blocks, and a vertex of it; of a coarse level, -1.
   block: number;
-  corner: number;
+  vertex: number;
 }
 
 interface Look {
@@ -51,7 +51,7 @@ interface Look {
 
 type Drawn = Mesh<BufferGeometry, MeshPhongMaterial>;
 
-interface DrawnBlock {
+export interface DrawnBlock {
   // One mesh; of a label two, for its front and for its back.
   meshes: Drawn[];
   geometry: BufferGeometry;
@@ -67,15 +67,6 @@ interface DrawnBlock {
 }
 
 const wiresPerFrame = 4;
-
-function geometryOf({ positions, normals, distances }: Omit<Coarse, 'index'>, index: Uint16Array | Uint32Array): BufferGeometry {
-  const made = new BufferGeometry();
-  made.setAttribute('position', new BufferAttribute(positions, 3));
-  made.setAttribute('normal', new BufferAttribute(normals, 4, true));
-  if (distances) made.setAttribute('distanceMm', new BufferAttribute(distances, 1));
-  made.setIndex(new BufferAttribute(index, 1));
-  return made;
-}
 
 export class Parts {
   private readonly blocks: DrawnBlock[] = [];
@@ -151,7 +142,7 @@ export class Parts {
     this.shader.setTop(millimetres);
   }
 
-  private get finest(): DrawnBlock[] {
+  get finest(): readonly DrawnBlock[] {
     return this.blocks.filter(({ isLevel }) => !isLevel);
   }
 
@@ -159,6 +150,30 @@ export class Parts {
   get finder(): PartFinder {
     this.known ??= new PartFinder(this.finest.map(({ made }) => made));
     return this.known;
+  }
+
+  // The triangles that are drawn of each of the finest blocks; null: all.
+  setIndex(indexOf: ((block: number) => Uint16Array<ArrayBuffer>) | null): void {
+    this.finest.forEach(({ geometry, made }, at) => {
+      geometry.setIndex(new BufferAttribute(indexOf?.(at) ?? made.index, 1));
+      this.wires.forget(geometry);
+    });
+    this.takeCopies([]);
+    this.showAll();
+  }
+
+  // Takes all blocks away.
+  clear(): void {
+    for (const { meshes, geometry, wire } of this.blocks.splice(0)) {
+      this.scene.remove(...meshes, ...(wire ? [wire] : []));
+      this.wires.forget(geometry);
+      geometry.dispose();
+    }
+    this.takeCopies([]);
+    for (const { copy, copyWire } of this.looks.values()) this.scene.remove(...copy, copyWire);
+    this.looks.clear();
+    this.known = null;
+    this.isWhole = false;
   }
 
   // Those of the finest blocks that can be drawn.
@@ -275,18 +290,19 @@ export class Parts {
     for (const block of this.blocks) {
       const { geometry, made } = block;
       if (!this.isSeen(block) || !geometry.boundingBox || !ray.intersectsBox(geometry.boundingBox)) continue;
-      const met = firstMet(made.positions, made.index, ray, { from, to: end });
+      const met = firstMet(made.positions, geometry.getIndex()?.array ?? [], ray, { from, to: end });
       if (met.corner < 0) continue;
       end = met.at;
       nearest = { block, corner: met.corner };
     }
     if (!nearest) return null;
     const { block, corner } = nearest;
-    const { label, distances, made } = block;
-    const place = { block: this.finest.indexOf(block), corner };
+    const { label, distances, made, geometry } = block;
+    const index = geometry.getIndex()?.array ?? [];
+    const place = { block: this.finest.indexOf(block), vertex: index[corner] ?? 0 };
     if (!distances) return { at: end, label, ...place };
     const point = ray.at(end, new Vector3()).toArray();
-    const corners = [0, 1, 2].map((i) => made.index[corner + i] ?? 0) as [number, number, number];
+    const corners = [0, 1, 2].map((i) => index[corner + i] ?? 0) as [number, number, number];
     const distance = valueWithin(distances, made.positions, corners, point);
     return { at: end, label, distance, ...place };
   }

@@ -1,4 +1,4 @@
-#include "server/jobs/making/defaults.h"
+#include "server/jobs/library/defaults.h"
 
 #include <algorithm>
 #include <string>
