@@ -1,5 +1,7 @@
 #include "base/base64.h"
 
+#include <algorithm>
+
 #include <openssl/evp.h>
 
 namespace isomesh {
@@ -46,6 +48,18 @@ std::optional<std::string> from_base64(std::string_view text) {
   if (length < 0) return std::nullopt;
   bytes.resize(static_cast<std::size_t>(length) - padding);  // OpenSSL counts the padding as zeros
   return bytes;
+}
+
+std::optional<std::string> from_base64url(std::string_view text) {
+  constexpr std::size_t kGroup = 4;
+  if (text.find_first_of("+/=") != std::string_view::npos) return std::nullopt;
+  std::string padded(text);
+  std::ranges::replace(padded, '-', '+');
+  std::ranges::replace(padded, '_', '/');
+  padded.append((kGroup - padded.size() % kGroup) % kGroup, '=');
+  const auto bytes = from_base64(padded);
+  // The bits after the last byte could differ.
+  return bytes && to_base64(std::string_view(*bytes)) == padded ? bytes : std::nullopt;
 }
 
 }  // namespace isomesh

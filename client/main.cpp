@@ -6,6 +6,7 @@
 #include <iostream>
 #include <stop_token>
 #include <thread>
+#include <utility>
 
 #include <poll.h>
 #include <pthread.h>
@@ -15,6 +16,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/options.h"
+#include "client/mcp/command.h"
 #include "server/hospital/command/orders.h"
 
 namespace {
@@ -105,7 +107,8 @@ int main(int argc, char** argv) {
   const Interrupt interrupt;
   int status = kRefused;
   try {
-    const Added added = order_commands();
+    Added added = order_commands();
+    for (AddedCommand& each : mcp_commands().commands) added.commands.push_back(std::move(each));
     status = run(parse_options(argc, argv, added), interrupt.token());
   } catch (const EarlyExit& exit) {
     (exit.status() == 0 ? std::cout : std::cerr) << exit.what();

@@ -41,6 +41,7 @@ void check_configured_files(const Options& options, const ConfiguredFiles& other
   check.file("blob-credentials", options.blobs.credentials);
   check.file("callback-ca", options.callback_authorities);
   check.file("blob-ca", options.blobs.authorities);
+  check.file("oidc-ca", options.provider.authorities);
   for (const auto& [name, file] : others) check.file(name, file);
   check.finish();
 }

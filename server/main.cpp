@@ -35,6 +35,7 @@
 #include "server/http/app/outcomes.h"
 #include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
+#include "server/http/oidc/provider.h"
 #include "server/http/server.h"
 #include "server/jobs/library/histograms.h"
 #include "server/jobs/library/label_lists.h"
@@ -106,18 +107,20 @@ Files open_files(const Options& options, const net::Address& address, http::Read
   // Otherwise every callback would fail, without a word at the start.
   net::check_authorities("callback-ca", options.callback_authorities);
   net::check_authorities("blob-ca", options.blobs.authorities);
+  net::check_authorities("oidc-ca", options.provider.authorities);
   return files;
 }
 
 void check_reach(const Options& options, const net::Address& address, const Files& files) {
   if (address.is_loopback()) return;
-  if (!files.tokens && !options.open_network) {
+  const bool has_logins = files.tokens || !options.provider.issuer.empty();
+  if (!has_logins && !options.open_network) {
     throw invalid_parameter(
         "listen",
         "requests are not authenticated, so only loopback addresses and Unix sockets are allowed. "
-        "Use --tokens or --open-network for other addresses");
+        "Use --tokens, --oidc-issuer or --open-network for other addresses");
   }
-  if (files.tokens && !files.tls) {
+  if (has_logins && !files.tls) {
     log_warning("tokens and volumes cross the network unencrypted; --tls-cert encrypts them");
   }
 }
@@ -178,6 +181,7 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
+  if (!options.provider.issuer.empty()) oidc::check_options(options.provider);
   check_blobs(options.blobs);
   std::cout << as_config(cli, Remarks::kNo);
   return 0;
@@ -192,6 +196,7 @@ void tell_start(const Options& options, const std::string& url, std::size_t conn
       .add("blobs", kind_of(options.blobs))
       .add("workers", options.workers)
       .add("tokens", options.tokens.empty() ? "no" : "yes")
+      .add("oidc", options.provider.issuer.empty() ? "no" : "yes")
       .add("connections", connections);
 }
 
@@ -223,6 +228,10 @@ int run(const Options& options, const sigset_t& signals) {
   check_configured_files(options);
   const Files files = open_files(options, address, http::ReadBy::kService);
   check_reach(options, address, files);
+  std::unique_ptr<oidc::Provider> provider;
+  if (!options.provider.issuer.empty()) {
+    provider = std::make_unique<oidc::Provider>(options.provider);
+  }
   const callbacks::CallbackTargets targets(options.callback_targets);
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
@@ -298,6 +307,7 @@ int run(const Options& options, const sigset_t& signals) {
                                    .callbacks = callbacks,
                                    .callback_targets = targets,
                                    .tokens = files.tokens.get(),
+                                   .provider = provider.get(),
                                    .wing = wing.get()};
   http::Server server(services, server_options);
   const std::string url = server.bind(address);

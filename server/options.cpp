@@ -261,6 +261,25 @@ std::vector<Row> rows_of(Options& options) {
       {"tokens", options.tokens, no_limits,
        "File of the tokens that requests need; `isomeshd token add` creates them. SIGHUP "
        "reloads it"},
+      {"oidc-issuer", options.provider.issuer, typed("URL"),
+       "Login provider (OpenID Connect), such as https://login.example/realms/hospital. Its tokens "
+       "are accepted beside those of --tokens"},
+      {"oidc-audience", options.provider.audience, no_limits,
+       "Audience that tokens of the login provider must be for"},
+      {"oidc-client-id", options.provider.client_id, no_limits,
+       "Name of the web page at the login provider. Without it, the page has no login"},
+      {"oidc-role-claim", options.provider.role_claim, no_limits,
+       "Member of such tokens that lists the roles of a person, such as realm_access.roles"},
+      {"oidc-role", options.provider.roles, repeated("VALUE=ROLE"),
+       "Role user, admin or monitor of persons with this value in that list. May be repeated; * "
+       "stands for everybody. Default: isomesh-user=user, isomesh-admin=admin and "
+       "isomesh-monitor=monitor"},
+      {"oidc-parameter", options.provider.parameters, repeated("NAME=VALUE"),
+       "Parameter that the page adds to its login, such as scope=openid api://isomesh/.default, "
+       "resource=URL or audience=NAME. May be repeated"},
+      {"oidc-ca", options.provider.authorities, no_limits,
+       "File of the certificate authorities to trust for the login provider, instead of the "
+       "system's"},
       {"tls-cert", options.tls_certificate, no_limits,
        "Certificate file (PEM), to listen with https. SIGHUP reloads it and the key"},
       {"tls-key", options.tls_key, no_limits, "File of the certificate's private key (PEM)"},
@@ -326,6 +345,10 @@ void add_options(CLI::App& cli, Options& options) {
     row.limits(added);
   }
   cli.get_option("--tls-key")->needs("--tls-cert");
+  for (const char* name :
+       {"--oidc-audience", "--oidc-client-id", "--oidc-role", "--oidc-parameter", "--oidc-ca"}) {
+    cli.get_option(name)->needs("--oidc-issuer");
+  }
   add_operator_overrides(cli, options);
   add_check(cli, options);
 }

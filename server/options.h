@@ -12,6 +12,7 @@
 #include "base/log.h"
 #include "server/blobs.h"
 #include "server/callbacks/limits.h"
+#include "server/http/oidc/provider.h"
 #include "server/http/server.h"
 #include "server/jobs/library/import_runner.h"
 #include "server/store/job_store.h"
@@ -35,7 +36,8 @@ struct Options {
   unsigned drain_seconds = 30;
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
-  std::filesystem::path tokens;  // empty: no authentication
+  std::filesystem::path tokens;  // empty: none; without a provider too: no authentication
+  oidc::ProviderOptions provider;
   std::filesystem::path tls_certificate;
   std::filesystem::path tls_key;
   std::filesystem::path wing;  // configuration of the wing; empty: none

@@ -338,8 +338,14 @@ void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats, C
   CLI::Option* const labels = options.at("labels");
   options.at("interpolation")->excludes(labels);  // vertices of labels lie half-way
   app.parse_complete_callback([&parameters, &app, kept, labels, iso = options.at("iso")] {
-    if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
-    if (labels->count() == 0) return;
+    const CLI::Option* masks = app.get_option_no_throw("--masks");
+    const bool are_masks = masks != nullptr && masks->count() > 0;
+    if (are_masks && iso->count() > 0) throw CLI::ExcludesError("--iso", "--masks");
+    if (are_masks && labels->count() == 0) parameters.labels.emplace();
+    if (!are_masks && labels->count() + iso->count() == 0) {
+      throw CLI::RequiredError("--iso or --labels");
+    }
+    if (!parameters.labels) return;
     const auto is_left_out = [&](const std::string& name) {
       return app.get_option("--" + name)->count() == 0;
     };

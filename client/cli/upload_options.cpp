@@ -43,6 +43,11 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
   add(app, "--member", "NAME", "The archive's member to use, if it holds several volumes",
       [&](const std::string& text) { options.upload.member = text; })
       ->group(kUploadGroup);
+  app.add_flag(
+         "--masks", options.upload.masks,
+         "The files or folder are masks, each of one structure: make one volume of them, with "
+         "a label for each, named after its file. Without --labels, all are meshed")
+      ->group(kUploadGroup);
   add_number<std::uint32_t>(app, "--volume",
                             "Index of the volume to use, from 0, if the file holds several",
                             [&](std::uint32_t number) { options.upload.volume = number; })

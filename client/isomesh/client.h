@@ -61,9 +61,11 @@ using TransferProgress = std::function<void(std::uint64_t done, std::uint64_t to
 using JobProgress = std::function<void(const Job& job)>;
 
 struct UploadOptions {
-  std::optional<RawDescription> raw = {};    // empty: the file has a header
-  std::string series = {};                   // UID of the DICOM series, if the upload has several
-  std::string member = {};                   // the archive's member, if it has several volumes
+  std::optional<RawDescription> raw = {};  // empty: the file has a header
+  std::string series = {};                 // UID of the DICOM series, if the upload has several
+  std::string member = {};                 // the archive's member, if it has several volumes
+  // The upload is several masks, of one structure each: makes one volume of labels of them.
+  bool masks = false;
   std::optional<std::uint32_t> volume = {};  // index of the volume in its file, from 0
   // Codes of notes whose errors to override, as listed in the server's error.
   std::vector<std::string> accept = {};

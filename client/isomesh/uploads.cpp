@@ -46,6 +46,7 @@ std::string upload_query(const UploadOptions& options) {
   }
   if (!options.series.empty()) pairs.emplace_back("series", options.series);
   if (!options.member.empty()) pairs.emplace_back("member", options.member);
+  if (options.masks) pairs.emplace_back("masks", "true");
   if (options.volume) pairs.emplace_back("volume", std::to_string(*options.volume));
   std::string accepted;
   for (const std::string& code : options.accept) accepted += (accepted.empty() ? "" : ",") + code;

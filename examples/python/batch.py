@@ -10,7 +10,6 @@ Files that are not volumes are listed on standard error and skipped.
 import argparse
 import csv
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import isomesh_client
@@ -27,31 +26,20 @@ def main() -> int:
     client = isomesh_client.Client(arguments.server)
     if not arguments.scans.is_dir():
         parser.error(f"there is no folder {arguments.scans}")
-    arguments.meshes.mkdir(parents=True, exist_ok=True)
-
-    def mesh(scan: Path):
-        volume = client.upload(scan)
-        job = client.submit(volume, iso=arguments.iso, formats=["glb"], close=True, priority="bulk")
-        done = client.wait(job)
-        client.download(done, arguments.meshes / f"{scan.name}.glb")
-        return done["mesh"]
-
     table = csv.writer(sys.stdout)
     table.writerow(["scan", "triangles", "closed", "area_mm2", "volume_mm3"])
-    failed = 0
-    # Several threads may share one Client; the server's queue keeps the jobs in order.
-    with ThreadPoolExecutor(max_workers=4) as pool:
-        scans = sorted(each for each in arguments.scans.iterdir() if not each.name.startswith("."))
-        for scan, result in [(scan, pool.submit(mesh, scan)) for scan in scans]:
-            try:
-                found = result.result()
-            except isomesh_client.IsomeshError as error:
-                failed += 1
-                print(f"{scan}: {error}", file=sys.stderr)
-                continue
-            row = [found["triangles"], found["quality"]["closed"]]
-            table.writerow([scan.name, *row, round(found["area_mm2"], 1), round(found["volume_mm3"]["smoothed"], 1)])
-    return 1 if failed else 0
+    scans = sorted(each for each in arguments.scans.iterdir() if not each.name.startswith("."))
+    results = client.mesh_all(
+        scans, to=lambda scan: arguments.meshes / f"{scan.name}.glb", iso=arguments.iso, close=True, priority="bulk"
+    )
+    for result in results:
+        if not result:
+            print(f"{result.source}: {result.error}", file=sys.stderr)
+            continue
+        found = result.job["mesh"]
+        row = [found["triangles"], found["quality"]["closed"]]
+        table.writerow([result.source.name, *row, round(found["area_mm2"], 1), round(found["volume_mm3"]["smoothed"], 1)])
+    return 0 if all(results) else 1
 
 
 if __name__ == "__main__":

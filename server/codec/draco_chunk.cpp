@@ -58,30 +58,48 @@ std::optional<mesh::Topology> topology_of(const mesh::Mesh& mesh, std::span<Drac
   return join_topology(mesh, parts, context);
 }
 
-std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block) {
-  const auto triangles = static_cast<double>(mesh.triangles.size());
-  const auto layers = static_cast<double>(mesh.layers());
+BlockCut::BlockCut(std::uint64_t triangles, std::size_t layers, std::size_t triangles_per_block) {
+  if (triangles == 0) return;
+  const double of_layer = static_cast<double>(triangles) / static_cast<double>(layers);
   const auto target = static_cast<double>(triangles_per_block);
-  if (mesh.triangles.size() == 0) return {};
+  const auto at_least_one = [](double number) {
+    return static_cast<std::size_t>(std::max(1.0, number));
+  };
+  const auto layers_for = [&] {
+    return at_least_one(std::round(target * static_cast<double>(parts) / of_layer));
+  };
   // Assumes that the volume is as deep as it is high: then a block of n layers by a layer's nth
   // part is a cube.
-  const auto parts =
-      static_cast<std::size_t>(std::max(1.0, std::round(std::sqrt(triangles / target))));
-  const auto depth = static_cast<std::size_t>(
-      std::max(1.0, std::round(target * static_cast<double>(parts) * layers / triangles)));
+  parts = at_least_one(std::round(std::sqrt(static_cast<double>(triangles) / target)));
+  depth = layers_for();
+  if (depth <= kMostLayers) return;
+  parts = at_least_one(std::floor(of_layer * kMostLayers / target));
+  depth = layers_for();
+  if (parts > 1) depth = std::min(depth, kMostLayers);
+}
+
+std::vector<Block> blocks_of(const mesh::Mesh& mesh, std::size_t begin, std::size_t end,
+                             const BlockCut& cut) {
   std::vector<Block> blocks;
-  for (std::size_t bottom = 0; bottom < mesh.layers(); bottom += depth) {
-    const std::size_t top = std::min(mesh.layers(), bottom + depth);
-    for (std::size_t part = 0; part < parts; ++part) {
-      Block block;
-      for (std::size_t layer = bottom; layer < top; ++layer) {
-        const std::uint64_t first = mesh.layer_triangles[layer];
-        const std::uint64_t count = mesh.layer_triangles[layer + 1] - first;
-        const Run run = {first + count * part / parts, first + count * (part + 1) / parts};
-        if (run.begin < run.end) block.push_back(run);
-      }
-      if (!block.empty()) blocks.push_back(std::move(block));
+  for (std::size_t part = 0; part < cut.parts; ++part) {
+    Block block;
+    for (std::size_t layer = begin; layer < end; ++layer) {
+      const std::uint64_t first = mesh.layer_triangles[layer];
+      const std::uint64_t count = mesh.layer_triangles[layer + 1] - first;
+      const Run run = {first + count * part / cut.parts, first + count * (part + 1) / cut.parts};
+      if (run.begin < run.end) block.push_back(run);
     }
+    if (!block.empty()) blocks.push_back(std::move(block));
+  }
+  return blocks;
+}
+
+std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block) {
+  const BlockCut cut(mesh.triangles.size(), mesh.layers(), triangles_per_block);
+  std::vector<Block> blocks;
+  for (std::size_t bottom = 0; bottom < mesh.layers(); bottom += cut.depth) {
+    const std::size_t top = std::min(mesh.layers(), bottom + cut.depth);
+    for (Block& block : blocks_of(mesh, bottom, top, cut)) blocks.push_back(std::move(block));
   }
   return blocks;
 }

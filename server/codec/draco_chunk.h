@@ -21,6 +21,7 @@ namespace isomesh::codec {
 
 struct DracoStream {
   std::vector<std::byte> bytes;
+  std::size_t aside = 0;  // the bytes if they have been set aside
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   std::uint32_t position_id = 0;  // the attributes' ids within the stream
@@ -30,6 +31,8 @@ struct DracoStream {
   // The topology of the triangles, found during encoding, in the mesh's vertex numbers. libdraco
   // reports none.
   std::optional<mesh::PartTopology> topology;
+
+  std::size_t size() const { return bytes.size() + aside; }
 };
 
 // Combines the topology of streams that cover all triangles of the mesh. Empty if a stream has
@@ -46,10 +49,23 @@ struct Run {
 // Triangles that are encoded together: one run from each of several consecutive layers.
 using Block = std::vector<Run>;
 
-// Cuts the mesh into blocks of about that many triangles. Blocks are as compact as the order of the
-// triangles allows, because they duplicate the vertices on their seams: a layer is cut into equal
-// runs, and a block stacks the runs at one place of consecutive layers. Every triangle is in one
-// block. No block is empty.
+// How a surface is cut into blocks of about equally many triangles. Blocks are as compact as the
+// order of the triangles allows, because they duplicate the vertices on their seams: a layer is cut
+// into equal runs, and a block stacks the runs at one place of consecutive layers.
+struct BlockCut {
+  std::size_t parts = 1;  // of a layer
+  std::size_t depth = 1;  // layers of a block; at most kMostLayers if a layer has several parts
+
+  static constexpr std::size_t kMostLayers = 32;
+
+  // For blocks of about so many triangles.
+  BlockCut(std::uint64_t triangles, std::size_t layers, std::size_t triangles_per_block);
+};
+
+// The blocks of the layers [begin, end), which are those of a row of blocks. No block is empty.
+std::vector<Block> blocks_of(const mesh::Mesh& mesh, std::size_t begin, std::size_t end,
+                             const BlockCut& cut);
+// Every triangle is in one block.
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
 
 // The name of distances in files. glTF requires the underscore for application-specific attributes.

@@ -11,6 +11,7 @@
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
 #include "server/codec/glb_document.h"
+#include "server/codec/glb_writer.h"
 #include "server/codec/label_titles.h"
 #include "server/codec/levels.h"
 #include "server/codec/plain_chunk.h"
@@ -20,17 +21,6 @@
 
 namespace isomesh::codec {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "GLB is little-endian");
-
-// Measured: with half as many, duplicated seam vertices cost 1.5 % more bytes; with twice as many,
-// the first block arrives later and its vertices no longer fit 16 bits.
-constexpr std::size_t kTrianglesPerBlock = 100'000;
-// glTF 2.0, section 4.4.
-constexpr std::uint32_t kMagic = 0x46546C67;
-constexpr std::uint32_t kVersion = 2;
-constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
-constexpr std::uint32_t kBinaryChunk = 0x004E4942;
 
 struct Distances {
   Distances() = default;
@@ -57,7 +47,6 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
                       const mesh::Context& context) {
   GlbLevel level = {.share = share};
   if (mesh.triangles.size() == 0) return level;
-  const DracoOptions options = {grid, parameters.draco.speed};
   const mesh::Context quiet = {context.stop, nullptr};
   // Computed on the whole mesh, so both sides of a seam have the same.
   mesh::Buffer<mesh::Vec3> normals;
@@ -66,39 +55,20 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
   const std::vector<Block> blocks = parameters.merge
                                         ? std::vector<Block>{{{0, mesh.triangles.size()}}}
                                         : cut_blocks(mesh, kTrianglesPerBlock);
-  if (parameters.glb_codec != GlbCodec::kDraco) {
-    level.arrays.resize(blocks.size());
-    mesh::parallel_for(context, blocks.size(), [&](std::size_t i) {
-      level.arrays[i] = encode_arrays(mesh, blocks[i], grid, data, parameters.glb_codec);
-    });
+  if (parameters.merge && parameters.glb_codec == GlbCodec::kDraco) {
+    Encoders& encoders = Encoders::instance();
+    auto encoder = encoders.take(mesh.triangles.size());
+    level.streams.push_back(
+        encoder->encode_whole(mesh, {grid, parameters.draco.speed}, data, quiet));
+    encoders.give_back(std::move(encoder));
+    if (context.progress) context.progress(1);
     return level;
   }
-  level.streams.resize(blocks.size());
-  Encoders& encoders = Encoders::instance();
+  level.make_room(blocks.size(), parameters.glb_codec);
   mesh::parallel_for(context, blocks.size(), [&](std::size_t i) {
-    auto encoder = encoders.take(parameters.merge ? mesh.triangles.size() : kTrianglesPerBlock);
-    level.streams[i] = parameters.merge
-                           ? encoder->encode_whole(mesh, options, data, quiet)
-                           : encoder->encode_block(mesh, blocks[i], options, data, quiet);
-    encoders.give_back(std::move(encoder));
+    encode_glb_block(mesh, blocks[i], grid, data, parameters, quiet, i, level);
   });
   return level;
-}
-
-bool is_plain(const MeshParameters& parameters) { return parameters.glb_codec == GlbCodec::kNone; }
-
-constexpr std::size_t kHeaderBytes = 12;
-constexpr std::size_t kChunkHeaderBytes = 8;
-
-// Throws Error kTooLarge if a file of so many bytes cannot be.
-void check_size(std::size_t bytes, const MeshParameters& parameters) {
-  if (bytes <= std::numeric_limits<std::uint32_t>::max()) return;
-  throw Error(ErrorCode::kTooLarge,
-              "The encoded surface exceeds the 4 GiB that a GLB file can hold. Set \"triangles\" "
-              "to simplify it" +
-                  std::string(parameters.glb_codec == GlbCodec::kDraco
-                                  ? "."
-                                  : ", or \"glb_codec\" to \"draco\" to compress it."));
 }
 
 bool is_solid(const mesh::Topology& topology) {
@@ -109,41 +79,8 @@ bool is_solid(const mesh::Topology& topology) {
 GlbLevel plain_level(double share, const mesh::Mesh& mesh, const MeshParameters& parameters) {
   GlbLevel level = {.share = share};
   if (mesh.triangles.size() > 0) level.arrays.push_back(describe_plain(mesh, parameters));
-  check_size(level.bytes(), parameters);
+  check_glb_size(level.bytes(), parameters);
   return level;
-}
-
-void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
-  sink(std::as_bytes(std::span(words.begin(), words.size())));
-}
-
-void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenance& provenance,
-               const mesh::Context& context, const Sink& sink) {
-  const GlbLayout layout(parts);
-  const std::size_t binary_bytes = layout.bytes();
-  std::string json = glb_document(parts, layout, grid, provenance);
-  json.resize(glb_padded(json.size()), ' ');
-
-  const std::size_t total = kHeaderBytes + kChunkHeaderBytes + json.size() +
-                            (binary_bytes == 0 ? 0 : kChunkHeaderBytes + binary_bytes);
-  check_size(total, provenance.parameters);
-  write_words(sink, {kMagic, kVersion, static_cast<std::uint32_t>(total)});
-  write_words(sink, {static_cast<std::uint32_t>(json.size()), kJsonChunk});
-  sink(std::as_bytes(std::span(json)));
-  if (binary_bytes == 0) return;
-  write_words(sink, {static_cast<std::uint32_t>(binary_bytes), kBinaryChunk});
-  std::size_t written = 0;
-  const Sink counted = [&](std::span<const std::byte> bytes) {
-    sink(bytes);
-    written += bytes.size();
-    if (context.progress) {
-      context.progress(static_cast<double>(written) / static_cast<double>(binary_bytes));
-    }
-  };
-  for (const GlbLevel* level : layout.order()) level->put(counted);
-  if (written != binary_bytes) {
-    throw Error(ErrorCode::kInternal, "the arrays of a GLB file have other sizes than it tells");
-  }
 }
 
 GlbPart part_of(const LabelSummary& label) {
@@ -228,7 +165,7 @@ GlbLevel plain_label(const WallLevel& walls, std::size_t number, double share,
   // The job has measured the labels of the finest level.
   level.is_solid = share == 1 ? label.closed && label.manifold && label.oriented
                               : is_solid(measure_topology(mesh, context));
-  level.put_arrays = [&walls, number, &parameters, context](const Sink& sink) {
+  level.put_others = [&walls, number, &parameters, context](const Sink& sink) {
     const OwnSurface own(walls.surface, number, walls.distances, parameters, context);
     put_plain(own.mesh, parameters, own.distances.values.span(), context, sink);
   };
@@ -309,12 +246,12 @@ std::optional<mesh::Topology> encode_surface(const FileContent& content,
     plain.is_solid = is_solid(found);
     if (!topology) topology = found;
     if (progress.progress) progress.progress(1);
-    plain.put_arrays = [&parameters, &level, distances_of, quiet](const Sink& to) {
+    plain.put_others = [&parameters, &level, distances_of, quiet](const Sink& to) {
       put_plain(level, parameters, distances_of(level).values.span(), quiet, to);
     };
     return plain;
   };
-  GlbPart part = {.name = "surface", .material = "neutral"};
+  GlbPart part = GlbPart::of_surface();
   part.add_level(level_of(1, mesh, LevelProgress(context, parameters, 0).encode));
   mesh::Mesh coarse;
   if (!shares.empty()) coarse = copy_of(mesh);

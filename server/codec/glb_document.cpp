@@ -53,7 +53,7 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
                    const MeshParameters& parameters) {
   const std::size_t view = gltf["bufferViews"].size();
   gltf["bufferViews"].push_back(
-      {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", chunk.bytes.size()}});
+      {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", chunk.size()}});
   const std::size_t accessor = gltf["accessors"].size();
   gltf["accessors"].push_back({{"componentType", kFloat},
                                {"count", chunk.vertices},
@@ -218,7 +218,7 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
   gltf["meshes"].push_back({{"name", name}, {"primitives", Json::array()}});
   for (const DracoStream& chunk : level.streams) {
     add_primitive(gltf, chunk, offset, parameters);
-    offset += glb_padded(chunk.bytes.size());
+    offset += glb_padded(chunk.size());
   }
   for (const ArrayChunk& chunk : level.arrays) {
     add_primitive(gltf, chunk, offset, parameters.glb_codec);
@@ -312,13 +312,14 @@ void GlbLevel::put(const Sink& sink) const {
   constexpr std::array<std::byte, kGlbAlignment> kZeros = {};
   for (const DracoStream& stream : streams) {
     const std::size_t bytes = stream.bytes.size();
+    if (bytes == 0) continue;
     sink(stream.bytes);
     sink(std::span(kZeros).first(glb_padded(bytes) - bytes));
   }
   for (const ArrayChunk& chunk : arrays) {
     if (!chunk.bytes.empty()) sink(chunk.bytes);
   }
-  if (put_arrays) put_arrays(sink);
+  if (put_others) put_others(sink);
 }
 
 GlbLayout::GlbLayout(std::span<const GlbPart> parts) : begins_(parts.size()) {

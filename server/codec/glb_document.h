@@ -22,8 +22,13 @@ struct GlbLevel {
   std::vector<DracoStream> streams = {};
   std::vector<ArrayChunk> arrays = {};
   bool is_solid = false;  // the only chunk is closed, manifold and oriented
-  // Writes the arrays if they have no bytes.
-  std::function<void(const Sink&)> put_arrays = {};
+  // Writes the streams or the arrays that have no bytes.
+  std::function<void(const Sink&)> put_others = {};
+
+  // Room for so many chunks.
+  void make_room(std::size_t chunks, GlbCodec codec) {
+    codec == GlbCodec::kDraco ? streams.resize(chunks) : arrays.resize(chunks);
+  }
 
   std::uint64_t triangles() const {
     std::uint64_t triangles = 0;
@@ -34,7 +39,7 @@ struct GlbLevel {
 
   std::size_t bytes() const {
     std::size_t bytes = 0;
-    for (const DracoStream& stream : streams) bytes += glb_padded(stream.bytes.size());
+    for (const DracoStream& stream : streams) bytes += glb_padded(stream.size());
     for (const ArrayChunk& chunk : arrays) bytes += chunk.size();
     return bytes;
   }
@@ -51,6 +56,8 @@ struct GlbPart {
   // From finest to coarsest, each with fewer triangles than the previous one. None for an empty
   // surface.
   std::vector<GlbLevel> levels = {};
+
+  static GlbPart of_surface() { return {.name = "surface", .material = "neutral"}; }
 
   // Omits a level without fewer triangles than the previous one.
   void add_level(GlbLevel level) {

@@ -39,6 +39,7 @@ void coarsen_in_steps(std::uint64_t triangles, const mesh::Context& context, con
 mesh::Mesh copy_of(const mesh::Mesh& mesh) {
   mesh::Mesh result;
   result.origin = mesh.origin;
+  result.reach = mesh.reach;
   copy(mesh.positions, result.positions);
   copy(mesh.triangles, result.triangles);
   result.layer_vertices = mesh.layer_vertices;

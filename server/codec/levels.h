@@ -20,6 +20,7 @@ auto use_in_space(const mesh::Mesh& mesh, Space space, Use use) {
   if (space == Space::kLps) return use(mesh);
   mesh::Mesh turned = copy_of(mesh);
   for (mesh::Vec3& position : turned.positions) position = in_space(position, space);
+  turned.reach = in_space(mesh.reach, space);
   return use(turned);
 }
 

@@ -15,6 +15,12 @@ inline mesh::Vec3 in_space(const mesh::Vec3& position, Space space) {
   return {0 - position[0], 0 - position[1], position[2]};  // avoids negative zeros
 }
 
+inline mesh::Reach in_space(const mesh::Reach& box, Space space) {
+  if (space == Space::kLps) return box;
+  return {{0 - box.high[0], 0 - box.high[1], box.low[2]},
+          {0 - box.low[0], 0 - box.low[1], box.high[2]}};
+}
+
 constexpr std::string_view letters_of(Space space) { return space == Space::kLps ? "LPS" : "RAS"; }
 
 }  // namespace isomesh::codec

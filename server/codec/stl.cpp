@@ -1,14 +1,19 @@
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/mutex.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
-#include "server/codec/facet_file.h"
 #include "server/codec/space.h"
+#include "server/codec/walked_file.h"
+#include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
 
 namespace isomesh::codec {
@@ -63,11 +68,55 @@ std::byte* write_facets(const mesh::Mesh& mesh, Space space, std::size_t begin, 
   return out;
 }
 
+class WalkedStl : public WalkedFile {
+ public:
+  explicit WalkedStl(const WalkedContent& content)
+      : space_(space_of(content.format, content.provenance.parameters)), sink_(content.sink) {
+    sink_(head_of(space_, length_unit(content.provenance.notes), content.size.triangles));
+  }
+
+  std::size_t parts(const mesh::Window& window) const override {
+    return mesh::chunks_of(window.mesh.triangles.size(), kTrianglesPerPart);
+  }
+
+  mesh::WindowUser::InOrder work(const mesh::Window& window, std::size_t part) override {
+    const std::size_t begin = part * kTrianglesPerPart;
+    const std::size_t end = std::min(window.mesh.triangles.size(), begin + kTrianglesPerPart);
+    const auto bytes = std::make_shared<std::vector<std::byte>>(take());
+    bytes->resize((end - begin) * kFacetBytes);
+    write_facets(window.mesh, space_, begin, end, bytes->data());
+    return [this, bytes] {
+      sink_(*bytes);
+      give_back(std::move(*bytes));
+    };
+  }
+
+ private:
+  static constexpr std::size_t kTrianglesPerPart = 1 << 15;
+
+  // Bytes are used again, so that their pages stay mapped.
+  std::vector<std::byte> take() {
+    const Lock lock(mutex_);
+    if (idle_.empty()) return {};
+    std::vector<std::byte> bytes = std::move(idle_.back());
+    idle_.pop_back();
+    return bytes;
+  }
+  void give_back(std::vector<std::byte> bytes) {
+    const Lock lock(mutex_);
+    idle_.push_back(std::move(bytes));
+  }
+
+  const Space space_;
+  const Sink& sink_;
+  Mutex mutex_;
+  std::vector<std::vector<std::byte>> idle_ ISOMESH_GUARDED_BY(mutex_);
+};
+
 }  // namespace
 
-const FacetFile* facet_file_of(MeshFormat format) {
-  static constexpr FacetFile kStl = {head_of, kFacetBytes, write_facets};
-  return format == MeshFormat::kStl ? &kStl : nullptr;
+std::unique_ptr<WalkedFile> walked_stl(const WalkedContent& content) {
+  return std::make_unique<WalkedStl>(content);
 }
 
 std::optional<mesh::Topology> encode_stl(const FileContent& content, const mesh::Context& context,

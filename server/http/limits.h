@@ -18,7 +18,7 @@ inline constexpr std::size_t kLongestPathParameter = 100;
 inline constexpr std::size_t kMostJsonBytes = std::size_t{64} << 10;
 // Of a form, which the HTTP library keeps in memory: heads of fields, and what follows a boundary.
 inline constexpr std::size_t kMostBytesBesideFiles = std::size_t{1} << 20;
-inline constexpr std::size_t kLongestToken = 512;
+inline constexpr std::size_t kLongestToken = 8000;  // a header line has at most 8192 bytes
 inline constexpr std::size_t kLongestUserName = 64;
 inline constexpr std::size_t kLongestIdempotencyKey = 255;
 inline constexpr std::size_t kLongestCursor = 128;
@@ -39,6 +39,14 @@ inline constexpr std::uint64_t kMostPreviewSize = 256;           // samples alon
 inline constexpr std::chrono::seconds kBetweenPings{15};
 inline constexpr std::chrono::milliseconds kReconnectAfter{2000};  // what browsers are told
 inline constexpr std::size_t kMostUnreadEvents = 4096;             // further ones are lost
+
+// --- The login provider (OpenID Connect) ---
+
+inline constexpr std::chrono::seconds kClockSkew{60};  // between its clock and this one
+inline constexpr std::size_t kMostProviderBytes = std::size_t{256} << 10;  // of one response
+inline constexpr std::chrono::seconds kLongestProviderFetch{10};
+inline constexpr std::size_t kMostSigningKeys = 64;
+inline constexpr std::size_t kLongestSubject = 255;  // of a person (OpenID Connect Core, 2)
 
 // --- The service ---
 

@@ -74,7 +74,7 @@ Server::~Server() {
 std::string Server::bind(const net::Address& address) {
   OriginRules& rules = state_->app.rules;
   const bool is_local = address.is_loopback() && !address.is_unix();
-  rules.check_host = state_->app.tokens == nullptr && (is_local || !rules.hosts.empty());
+  rules.check_host = !state_->app.logins.are_required() && (is_local || !rules.hosts.empty());
   rules.hosts.push_back(address.host);
   for (std::string& host : rules.hosts) host = host_of(host);
   const std::string authority = state_->listener.emplace(address).authority();

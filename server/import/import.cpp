@@ -69,6 +69,11 @@ Volume read_volume(const ImportTask& task, const FormatListener& listener) {
     throw invalid_parameter("member",
                             "selects a member of an archive, but this file is not an archive");
   }
+  if (task.options.masks && reader->content != Content::kFiles) {
+    throw invalid_parameter("masks",
+                            "combines the masks of a folder or archive, but this is a single file. "
+                            "Mesh its labels without it");
+  }
   return read_input(*reader, input);
 }
 

@@ -19,6 +19,7 @@
 #include "server/import/images/natural_order.h"
 #include "server/import/images/stack.h"
 #include "server/import/labels_beside.h"
+#include "server/import/masks.h"
 #include "server/import/other_formats.h"
 #include "server/import/readers.h"
 #include "server/import/source/scratch_folder.h"
@@ -267,7 +268,10 @@ void add_pages(const std::vector<FoundVolume>& pages, Contents& contents) {
   for (const FoundVolume& page : pages) contents.others.push_back(page.member);
 }
 
-Contents contents_of(Members& members) {
+// Identical masks are two structures, or two empty ones, so they are no duplicates.
+enum class Doubles { kLeaveOut, kKeep };
+
+Contents contents_of(Members& members, Doubles doubles) {
   const std::vector<FoundVolume> found = files_of_formats(members.all());
   const std::set<std::filesystem::path> data = data_of(found, members);
   Contents contents;
@@ -288,7 +292,9 @@ Contents contents_of(Members& members) {
   for (const ArchiveMember& member : members.all()) {
     if (!taken.contains(member.path)) contents.others.push_back(member);
   }
-  contents.volumes = without_doubles(std::move(contents.volumes), members);
+  if (doubles == Doubles::kLeaveOut) {
+    contents.volumes = without_doubles(std::move(contents.volumes), members);
+  }
   add_pages(pages, contents);
   return contents;
 }
@@ -393,8 +399,52 @@ Volume read_stack(const Stack& stack, const Contents& contents, const Members& m
   throw_choice(reason, std::move(choices));
 }
 
+Mask mask_of(const FoundVolume& found, Members& members) {
+  const auto& [member, reader, doubles] = found;
+  std::string file = member.name;
+  if (reader->name == kZarrReader.name) {
+    const std::string_view folder = folder_of(file);
+    if (!folder.empty()) file = folder.substr(0, folder.size() - 1);
+  }
+  return {std::move(file), [&](const ImportTask& task) {
+            static const FormatListener kNobody;
+            members.complete(found);
+            // Only for the files that a header names: no table of labels belongs to a mask.
+            const bool has_data = found.reader->data_names != nullptr;
+            return read_input(
+                *found.reader,
+                {.path = found.member.path,
+                 .companions = has_data ? members.companions_of(found.member.name) : Companions(),
+                 .task = task,
+                 .listener = kNobody});
+          }};
+}
+
+Volume read_masks(Members& members, const Input& input) {
+  if (!input.task.options.member.empty()) {
+    throw invalid_parameter("member", "cannot be combined with masks, which takes all members");
+  }
+  Contents contents = contents_of(members, Doubles::kKeep);
+  if (!contents.slices.empty() || !contents.stacks.empty()) {
+    throw_unusable(
+        "A mask is one file with a whole volume, but the upload has DICOM files or images. Leave "
+        "them out, or send the upload without masks.");
+  }
+  if (contents.volumes.empty()) throw_no_volume(members.all());
+  std::ranges::sort(contents.volumes, [](const FoundVolume& one, const FoundVolume& other) {
+    return comes_before(one.member.name, other.member.name);
+  });
+  if (input.listener) input.listener(contents.volumes.front().reader->name);
+  std::vector<Mask> masks;
+  for (const FoundVolume& found : contents.volumes) masks.push_back(mask_of(found, members));
+  Volume volume = import_masks(masks, input.task);
+  ignore(contents, volume);
+  return volume;
+}
+
 Volume read_members(Members& members, const Input& input) {
-  const Contents contents = contents_of(members);
+  if (input.task.options.masks) return read_masks(members, input);
+  const Contents contents = contents_of(members, Doubles::kLeaveOut);
   const std::string& asked = input.task.options.member;
   const std::size_t count =
       contents.volumes.size() + contents.stacks.size() + (contents.slices.empty() ? 0 : 1);

@@ -1,8 +1,11 @@
 // The mesh that every stage after extraction reads and writes.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -12,6 +15,29 @@ namespace isomesh::mesh {
 
 using Vec3 = std::array<float, 3>;              // millimetres, LPS
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
+
+// A box along the axes. Of nothing: its lowest corner is above its highest.
+struct Reach {
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+
+  Vec3 low = {kFar, kFar, kFar};
+  Vec3 high = {-kFar, -kFar, -kFar};
+
+  bool is_empty() const { return low[0] > high[0]; }
+  void add(const Reach& other) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], other.low[axis]);
+      high[axis] = std::max(high[axis], other.high[axis]);
+    }
+  }
+  bool holds(const Reach& other) const {
+    bool is_within = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      is_within &= other.low[axis] >= low[axis] && other.high[axis] <= high[axis];
+    }
+    return is_within;
+  }
+};
 
 inline constexpr std::size_t kFlagBits = 64;  // of a word of Mesh::on_border
 
@@ -27,6 +53,9 @@ inline constexpr std::size_t kFlagBits = 64;  // of a word of Mesh::on_border
 // lies on the border of the volume.
 struct Mesh {
   std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
+  // What smoothing does not leave as a rule: around the cells that the surface crosses, one sample
+  // wider. Empty of a mesh that has lost components since, and of walls.
+  Reach reach;
   Buffer<Vec3> positions;
   Buffer<Triangle> triangles;
   std::vector<std::uint64_t> layer_vertices;   // layers + 1 offsets into positions

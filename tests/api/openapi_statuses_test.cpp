@@ -234,9 +234,13 @@ void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
   statuses.probe("GET /metrics", "/metrics?x=1");
   statuses.probe("GET /version", "/version");
   statuses.probe("GET /version", "/version?no=1");
+  statuses.probe("GET /login", "/login");
+  statuses.probe("GET /login", "/login?no=1");
   statuses.probe("GET /openapi.yaml", "/openapi.yaml");
-  statuses.probe("GET /", "/");
-  statuses.probe("GET /", "/", {}, {{"If-None-Match", "*"}});
+  for (const std::string path : {"/", "/client.js"}) {
+    statuses.probe("GET " + path, path);
+    statuses.probe("GET " + path, path, {}, {{"If-None-Match", "*"}});
+  }
 }
 
 void probe_orders(Statuses& statuses, const Order& order, const std::string& body) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/json_text.h"
 #include "tests/api/daemon.h"
 
 namespace isomesh {
@@ -48,6 +49,21 @@ TEST_F(PageTest, IsAskedForAgainAndNotSentAgain) {
   EXPECT_EQ(again.status, 304);
   EXPECT_EQ(again.body, "");
   EXPECT_EQ(again.header("etag"), answer.header("etag"));
+}
+
+TEST_F(PageTest, AndTheClientIsAModuleOfThisVersion) {
+  const Answer answer = daemon_.get("/client.js");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.header("content-type"), "text/javascript; charset=utf-8");
+  EXPECT_EQ(daemon_.get("/client.js", {{"If-None-Match", answer.header("etag")}}).status, 304);
+  if (answer.header("etag") == "\"missing\"") {
+    EXPECT_THAT(answer.body, StartsWith("throw new Error('This isomeshd was built without"));
+    return;
+  }
+  const std::string version = parse_json<nlohmann::json>(daemon_.get("/version").body)["version"];
+  EXPECT_THAT(answer.body, StartsWith("/*! isomesh " + version + ": "));
+  EXPECT_THAT(answer.body, HasSubstr("\nexport {"));
+  EXPECT_THAT(answer.body, Not(HasSubstr("\nimport ")));
 }
 
 TEST_F(PageTest, HasNothingBesideItsFiles) {

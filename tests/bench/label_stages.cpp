@@ -82,8 +82,7 @@ void LabelStages::extract() {
 
 void LabelStages::remove_stairs() {
   with_lattice(samples_, [&](const auto& lattice) {
-    mesh::remove_stairs(lattice, options_, count_, std::numeric_limits<double>::infinity(), {},
-                        surface_);
+    mesh::remove_stairs(lattice, options_, std::numeric_limits<double>::infinity(), {}, surface_);
   });
 }
 

@@ -157,6 +157,10 @@ def segmentation(series, segments=(SKULL, LESION), slices=8, size=16):
         0x00080018: ("UI", instance), 0x00080020: ("DA", "20261120"),
         0x00080023: ("DA", "20261120"), 0x00080030: ("TM", "101112"),
         0x00080033: ("TM", "111213"), 0x00080050: ("SH", "ACC-1"), 0x00080060: ("CS", "SEG"),
+        0x00081115: ("SQ", sequence({
+            0x0008114A: ("SQ", sequence(*({0x00081150: ("UI", CT_IMAGE_STORAGE),
+                                           0x00081155: ("UI", each)} for each in series.files))),
+            0x0020000E: ("UI", series.uid)})),
         0x00080070: ("LO", "Maker"), 0x00080090: ("PN", "Refer^Red"),
         0x00081030: ("LO", "Head study"), 0x0008103E: ("LO", "Segments"),
         0x00081090: ("LO", "Model X"), 0x00100010: ("PN", "Muster^Erika"),

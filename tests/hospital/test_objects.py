@@ -1,7 +1,9 @@
 """What the objects say, and what the judges say of them."""
 import json
+import math
 import os
 import re
+import struct
 import subprocess
 
 import dicom
@@ -186,6 +188,76 @@ class Objects(Loop):
         self.assertEqual(len(re.findall("^Kd( [01]\\.[0-9]{6}){3}$", texts[0], re.MULTILINE)), 2)
         again = self.succeeded(daemon, daemon.order(body)["id"])
         self.assertEqual(again["results"], order["results"])
+
+    def report(self, series, uid, parameters):
+        """The order of a report, the path of that, and what dsrdump says of it."""
+        daemon = self.daemon()
+        body = {"source": {"pacs": "main", "study": series.study, "series": uid}, "rule": "bone",
+                "parameters": parameters, "send": [{"pacs": "main", "format": "sr"}]}
+        order = self.succeeded(daemon, daemon.order(body)["id"])
+        result, = order["results"]
+        path = os.path.join(self.folder.name, result["sop_instance_uid"] + ".dcm")
+        with open(path, "wb") as file:
+            file.write(self.pacs.file(result["sop_instance_uid"]))
+        # No standard code tells how far a mesh is from the extracted surface.
+        self.assert_judged(path, ("term <99ISOMESH>",))
+        said = subprocess.run(["dsrdump", "+Pc", path], capture_output=True, text=True,
+                              check=True)
+        # It warns that it does not check texts in UTF-8.
+        self.assertEqual([line for line in said.stderr.splitlines() if "ISO_IR 192" not in line], [])
+        again = self.succeeded(daemon, daemon.order(body)["id"])
+        self.assertEqual(again["results"], order["results"])
+        self.assertEqual([each["00080018"]["Value"][0]
+                          for each in self.pacs.objects(series.study, "SR")],
+                         [result["sop_instance_uid"]])
+        return daemon, order, path, said.stdout
+
+    def assert_measured(self, said, expected):
+        """The report has these numbers, in this order, to the digits of a decimal string."""
+        found = [float(each) for each in re.findall(r'="([-0-9.e+]+)" \(', said)]
+        self.assertEqual(len(found), len(expected), said)
+        for number, wanted in zip(found, expected):
+            self.assertAlmostEqual(number, wanted, delta=abs(wanted) * 1e-8 + 1e-12)
+
+    def diameter(self, stl):
+        """The largest distance of two vertices, from all pairs."""
+        points = {struct.unpack_from("<3f", stl, at + 12 + 12 * corner)
+                  for at in range(84, len(stl), 50) for corner in range(3)}
+        return max(math.dist(a, b) for a in points for b in points)
+
+    def test_a_report_of_a_surface(self):
+        series = self.series()
+        daemon, order, path, said = self.report(series, series.uid,
+                                                {"iso": 500, "max_error_mm": 0.5})
+        mesh = daemon.call("GET", "/v1/jobs/" + order["job"])[2]["mesh"]
+        stl = peers.call(daemon.port, "GET", f"/v1/jobs/{order['job']}/mesh.stl")[2]
+        bound = mesh["certificate"]["bound_mm"]
+        self.assert_measured(said, [mesh["volume_mm3"]["smoothed"], mesh["area_mm2"],
+                                    self.diameter(stl), 2 * bound, bound])
+        for instance in series.instances:
+            self.assertIn(f"[{instance}]", self.value(path, "0008,1155"))
+        self.assertEqual(self.value(path, "0008,0060"), ["[SR]"])
+
+    def test_a_report_of_segments(self):
+        """Each segment has its volume, area and diameter, and the report refers to it."""
+        series = self.series()
+        uid, instance, data = dicom.segmentation(series)
+        self.pacs.upload([data])
+        daemon, order, path, said = self.report(series, uid, {"labels": "all"})
+        job = daemon.call("GET", "/v1/jobs/" + order["job"])[2]["mesh"]
+        expected = []
+        for label in job["labels"]:
+            stl = peers.call(daemon.port, "GET",
+                             f"/v1/jobs/{order['job']}/mesh.stl?label={label['label']}")[2]
+            bound = job["certificate"].get("bound_mm")
+            expected += [label["volume_mm3"], label["area_mm2"], self.diameter(stl)]
+            expected += [job["certificate"]["found_mm"]] if bound is None else [2 * bound, bound]
+        self.assertEqual(len(job["labels"]), 2)
+        self.assert_measured(said, expected)
+        for segment in (dicom.SKULL, dicom.LESION):
+            for code in ("category", "type", "region"):
+                self.assertIn(segment[code][0], said)
+        self.assertIn(f"[{instance}]", self.value(path, "0008,1155"))
 
     def document(self, path):
         """The text that the object encapsulates: its element (0042,0011)."""

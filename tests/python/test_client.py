@@ -75,6 +75,25 @@ class Files(DaemonTest):
         self.assertEqual(chosen["id"], answers[1]["volume"]["id"])
         self.assertEqual(chosen["name"], "the second")
 
+    def test_a_folder_of_masks_is_one_volume_of_labels(self):
+        folder = self.folder / "masks"
+        folder.mkdir()
+        for name, at in (("liver", 6), ("aorta", 14)):
+            mask = numpy.zeros((20, 12, 12), "uint8")
+            mask[at - 3 : at + 3, 3:9, 3:9] = 1
+            header = self.write_meta_image(folder, f"{name}.raw", [f"{name}.raw"])
+            text = header.read_text().replace("40 32 24", "20 12 12").replace("MET_FLOAT", "MET_UCHAR")
+            header.rename(folder / f"{name}.mhd").write_text(text)
+            (folder / f"{name}.raw").write_bytes(mask.tobytes(order="F"))
+        mesh = self.client.mesh(folder, masks=True, close=True)
+        labels = [(each["label"], each["name"]) for each in mesh.job["mesh"]["labels"]]
+        self.assertEqual(labels, [(1, "aorta"), (2, "liver")])
+        (result,) = self.client.mesh_all([folder], to=self.folder / "all.glb", masks=True, close=True)
+        self.assertEqual(len(result.job["mesh"]["labels"]), 2)
+        (folder / "liver.raw").write_bytes(bytes(range(240)) * 12)
+        with self.assertRaisesRegex(isomesh_client.Refused, '"liver.mhd": It is not a mask'):
+            self.client.mesh(folder, masks=True)
+
     def test_links_in_a_folder_are_followed(self):
         folder = self.folder / "dataset" / "sub"
         objects = self.folder / "dataset" / ".git"

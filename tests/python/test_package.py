@@ -59,7 +59,7 @@ assert surface.GetNumberOfCells() == len(solid.given["faces"]) == len(mesh.faces
         script = "set -e\n" + examples("sh") + "\npython3 -c 'import isomesh_client; print(isomesh_client.__file__)'\n"
         environment = {
             **os.environ, "PATH": "/usr/bin:/bin", "PYTHONPATH": "/usr/lib/python3/dist-packages",
-            "PIP_NO_INDEX": "1", "PIP_NO_BUILD_ISOLATION": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+            "PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1",
         }
         found = subprocess.run(["sh", "-c", script], cwd=root, env=environment, capture_output=True, text=True)
         self.assertEqual(found.returncode, 0, found.stdout + found.stderr)
@@ -72,14 +72,10 @@ class Package(LimitedTest):
         cls.cache = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.cache.cleanup)
 
-    def test_pip_installs_it(self):
+    def test_pip_installs_it_without_a_network(self):
         with tempfile.TemporaryDirectory() as folder:
-            # The build leaves traces beside its sources.
-            source = Path(folder, "source")
-            shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("build", "*.egg-info", "__pycache__"))
             subprocess.check_call(
-                [sys.executable, "-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps",
-                 "--no-index", "--target", Path(folder, "to"), source],
+                [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--target", Path(folder, "to"), PACKAGE],
                 env={**os.environ, "PIP_ROOT_USER_ACTION": "ignore", "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
             )
             installed = sorted(each.name for each in Path(folder, "to", "isomesh_client").iterdir() if each.is_file())
@@ -91,6 +87,21 @@ class Package(LimitedTest):
             printed = subprocess.check_output([sys.executable, "-c", script], text=True, env=environment)
             self.assertEqual(printed.split()[:2], [isomesh_client.__version__, "False"])
             self.assertTrue(printed.split()[2].startswith(folder))
+            found = subprocess.run([sys.executable, "-c", "import isomesh"], env=environment, capture_output=True, text=True)
+            self.assertIn("No module named 'isomesh'", found.stderr)  # that name is another project's
+
+    def test_the_same_sources_make_the_same_packages(self):
+        """Also in another folder; the source distribution has what makes it and the wheel."""
+        code = "import backend, sys; print(backend.build_wheel(sys.argv[1]), backend.build_sdist(sys.argv[1]))"
+        with tempfile.TemporaryDirectory() as folder:
+            first, second = Path(folder, "first"), Path(folder, "second")
+            for target, source in ((first, PACKAGE), (second, Path(folder) / f"isomesh_client-{isomesh_client.__version__}")):
+                target.mkdir()
+                names = subprocess.check_output([sys.executable, "-c", code, target], cwd=source, text=True).split()
+                subprocess.check_call(["tar", "-xf", target / names[1], "-C", folder])
+            self.assertEqual(names, [f"isomesh_client-{isomesh_client.__version__}{end}" for end in ("-py3-none-any.whl", ".tar.gz")])
+            for name in names:
+                self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
 
     def test_its_version_is_the_projects(self):
         project = (ROOT / "CMakeLists.txt").read_text()

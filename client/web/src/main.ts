@@ -18,7 +18,8 @@ import { surfaceInWords } from './job/parameters';
 import { WatchedJobs } from './job/watched';
 import { button, h, icon, isTyping } from './ui/dom';
 import { showHelp } from './ui/help';
-import { mountNotices, pendingRefusal, refusal, tell } from './ui/notices';
+import { finishLogin } from './ui/login';
+import { mountNotices, pendingRefusal, refusal, tell, tellError } from './ui/notices';
 import { currentRoute, go, hashOf, isVolumeList, type Route } from './ui/route';
 import { Scope } from './ui/signal';
 import { startTheme, toggleTheme } from './ui/theme';
@@ -248,15 +249,19 @@ function watchJobs(): void {
   watched.start();
 }
 
+function start(): void {
+  watchConnection();
+  watchKeys();
+  watchDrops();
+  watchVisibility();
+  showOrders();
+  watchJobs();
+  watchToken(() => void show());
+  window.addEventListener('hashchange', () => void show());
+  void show();
+}
+
 startTheme();
 document.body.append(...shell());
 mountNotices(document.body);
-watchConnection();
-watchKeys();
-watchDrops();
-watchVisibility();
-showOrders();
-watchJobs();
-watchToken(() => void show());
-window.addEventListener('hashchange', () => void show());
-void show();
+void finishLogin().catch(tellError).then(start);

@@ -37,35 +37,54 @@ float Grid::decoded(float coordinate, std::size_t axis) const {
   return static_cast<float>(quantised) * (side / steps) + low[axis];
 }
 
-Grid grid_of(const mesh::Mesh& mesh, int bits) {
+Grid grid_of(const mesh::Reach& box, int bits) {
   Grid grid = {.low = {}, .side = 0, .bits = bits};
-  if (mesh.positions.size() == 0) return grid;
-  mesh::Vec3 low = mesh.positions[0];
-  mesh::Vec3 high = low;
-  float zero = 0;  // becomes NaN if multiplied by a non-finite value
-  for (const mesh::Vec3& position : mesh.positions) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], position[axis]);
-      high[axis] = std::max(high[axis], position[axis]);
-      zero += 0 * position[axis];
-    }
-  }
+  if (box.is_empty()) return grid;
   float longest = least_range(bits);
-  for (std::size_t axis = 0; axis < 3; ++axis) longest = std::max(longest, high[axis] - low[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    longest = std::max(longest, box.high[axis] - box.low[axis]);
+  }
   if (has_decimals(longest, bits)) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      grid.low[axis] = to_decimals(low[axis]);
+      grid.low[axis] = to_decimals(box.low[axis]);
       // The last decimal more: rounding could put the highest vertex outside.
-      grid.side = std::max(grid.side, to_decimals(high[axis] - grid.low[axis] + kDecimal));
+      grid.side = std::max(grid.side, to_decimals(box.high[axis] - grid.low[axis] + kDecimal));
     }
   } else {
-    grid.low = low;
+    grid.low = box.low;
     grid.side = longest;
   }
-  if (zero != 0 || !std::isfinite(grid.side)) {
+  if (!std::isfinite(grid.side)) {
     throw Error(ErrorCode::kUnusableVolume, "The surface has coordinates that are not finite.");
   }
   return grid;
+}
+
+mesh::Reach box_of(std::span<const mesh::Vec3> positions) {
+  mesh::Reach box;
+  float zero = 0;  // becomes NaN if multiplied by a non-finite value
+  for (const mesh::Vec3& position : positions) {
+    box.add({position, position});
+    for (const float coordinate : position) zero += 0 * coordinate;
+  }
+  if (zero != 0) {
+    const float far = mesh::Reach::kFar;
+    box = {{-far, -far, -far}, {far, far, far}};
+  }
+  return box;
+}
+
+bool is_grid_of(const mesh::Reach& reach, const mesh::Reach& box) {
+  float longest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    longest = std::max(longest, std::abs(reach.high[axis] - reach.low[axis]));
+  }
+  return !box.is_empty() && std::isfinite(longest) && reach.holds(box);
+}
+
+Grid grid_of(const mesh::Mesh& mesh, int bits) {
+  const mesh::Reach box = box_of(mesh.positions.span());
+  return grid_of(is_grid_of(mesh.reach, box) ? mesh.reach : box, bits);
 }
 
 }  // namespace isomesh::codec

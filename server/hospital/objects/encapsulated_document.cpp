@@ -6,16 +6,16 @@
 #include <utility>
 #include <vector>
 
-#include "base/clock.h"
 #include "proto/error.h"
 #include "server/hospital/objects/data_set.h"
+#include "server/hospital/objects/derived_object.h"
+#include "server/hospital/objects/measurement_report.h"
 #include "server/hospital/objects/uid.h"
 #include "server/hospital/protocol/orders.h"
 
 namespace isomesh::dicom {
 namespace {
 
-constexpr std::string_view kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 constexpr Tag kEncapsulatedDocument = 0x00420011;
 
 struct KindRow {
@@ -34,25 +34,6 @@ const KindRow& row_of(DocumentKind kind) {
   return *std::ranges::find(kKinds, kind, &KindRow::kind);
 }
 
-struct Moment {
-  std::string date;  // DA
-  std::string time;  // TM
-};
-
-// In UTC. Without a time zone offset, because that would apply to the other times of the object
-// too.
-Moment moment_of(std::chrono::system_clock::time_point time) {
-  return {utc_text(time, "%Y%m%d"), utc_text(time, "%H%M%S")};
-}
-
-DataSet code_item(const DicomCode& code) {
-  DataSet item;
-  item.set(0x00080100, "SH", code.value);    // CodeValue
-  item.set(0x00080102, "SH", code.scheme);   // CodingSchemeDesignator
-  item.set(0x00080104, "LO", code.meaning);  // CodeMeaning
-  return item;
-}
-
 // Code of the kind of model: the segment's type, or else by the modality of the images (PS3.16, CID
 // 7061).
 std::optional<DicomCode> concept_of(const DocumentObject& object) {
@@ -64,31 +45,8 @@ std::optional<DicomCode> concept_of(const DocumentObject& object) {
   return std::nullopt;
 }
 
-void add_patient_and_study(const DicomIdentity& identity, DataSet& data) {
-  data.set(0x00080020, "DA", identity.study_date);
-  data.set(0x00080030, "TM", identity.study_time);
-  data.set(0x00080050, "SH", identity.accession_number);
-  data.set(0x00080090, "PN", identity.referring_physician);
-  data.set_told(0x00081030, "LO", identity.study_description);
-  data.set(0x00100010, "PN", identity.patient_name);
-  data.set(0x00100020, "LO", identity.patient_id);
-  data.set_told(0x00100021, "LO", identity.issuer_of_patient_id);
-  data.set(0x00100030, "DA", identity.patient_birth_date);
-  data.set(0x00100040, "CS", identity.patient_sex);
-  data.set_told(0x00120062, "CS", identity.patient_identity_removed);
-  data.set_told(0x00120063, "LO", identity.deidentification_method);
-  data.set(0x0020000D, "UI", identity.study_uid);
-  data.set(0x00200010, "SH", identity.study_id);
-}
-
-void add_series_and_equipment(const DocumentObject& object, const Moment& made, DataSet& data) {
+void add_frame(const DocumentObject& object, DataSet& data) {
   const DicomIdentity& identity = object.identity;
-  data.set(0x00080021, "DA", made.date);  // SeriesDate
-  data.set(0x00080031, "TM", made.time);
-  data.set(0x00080060, "CS", "M3D");
-  data.set(0x0008103E, "LO", object.title);  // SeriesDescription
-  data.set(0x0020000E, "UI", object.series_uid);
-  data.set(0x00200011, "IS", std::to_string(object.series_number));
   // Meshes of one series share a frame of reference, even if the images have none.
   const std::string frame =
       identity.frame_of_reference_uid.empty()
@@ -96,17 +54,6 @@ void add_series_and_equipment(const DocumentObject& object, const Moment& made, 
           : identity.frame_of_reference_uid;
   data.set(0x00200052, "UI", frame);
   data.set(0x00201040, "LO", identity.position_reference_indicator);
-  data.set(0x00080070, "LO", "isomesh");            // Manufacturer
-  data.set(0x00081090, "LO", "isomeshd");           // ManufacturerModelName
-  data.set(0x00181000, "LO", object.station_name);  // DeviceSerialNumber
-  data.set(0x00181020, "LO", ISOMESH_VERSION);      // SoftwareVersions
-}
-
-DataSet reference_to(std::string_view sop_class, std::string_view instance) {
-  DataSet reference;
-  reference.set(0x00081150, "UI", sop_class);
-  reference.set(0x00081155, "UI", instance);
-  return reference;
 }
 
 // An item of ReferencedSeriesSequence.
@@ -139,24 +86,8 @@ void add_references(const DocumentObject& object, DataSet& data) {
   data.set_sequence(0x00081115, series);  // ReferencedSeriesSequence
 }
 
-void add_scanner(const DicomEquipment& equipment, DataSet& data) {
-  if (equipment == DicomEquipment()) return;
-  DataSet item;
-  item.set(0x00080070, "LO", equipment.manufacturer);
-  item.set_told(0x00081010, "SH", equipment.station_name);
-  item.set_told(0x00081090, "LO", equipment.model_name);
-  item.set_told(0x00181000, "LO", equipment.device_serial_number);
-  item.set_told(0x00181020, "LO", equipment.software_versions);
-  item.set_sequence(0x0040A170, {code_item({"109101", "DCM", "Acquisition Equipment"})});
-  data.set_sequence(0x0018A001, {item});  // ContributingEquipmentSequence
-}
-
-void add_document(const DocumentObject& object, const Moment& made, std::uint64_t bytes,
-                  DataSet& data) {
-  data.set(0x00080023, "DA", made.date);  // ContentDate
-  data.set(0x00080033, "TM", made.time);
+void add_document(const DocumentObject& object, std::uint64_t bytes, DataSet& data) {
   data.set(0x0008002A, "DT", object.identity.acquisition_datetime);
-  data.set(0x00200013, "IS", std::to_string(object.instance_number));
   data.set(0x00280301, "CS", "NO");          // BurnedInAnnotation
   data.set(0x00280302, "CS", "YES");         // RecognizableVisualFeatures
   data.set(0x00420010, "ST", object.title);  // DocumentTitle
@@ -190,6 +121,7 @@ std::string_view sop_class_of(DocumentKind kind) { return row_of(kind).sop_class
 std::string_view name_of_class(std::string_view sop_class) {
   const auto* row = std::ranges::find(kKinds, sop_class, &KindRow::sop_class);
   if (row != kKinds.end()) return row->name;
+  if (sop_class == kEnhancedSrStorage) return "Enhanced SR";
   throw Error(ErrorCode::kInternal, "an object of an unknown class");
 }
 
@@ -200,19 +132,20 @@ Envelope make_envelope(const DocumentObject& object, std::uint64_t document_byte
                                           std::to_string(kMostDocumentBytes) +
                                           ". Set \"triangles\" to simplify it.");
   }
-  const Moment made = moment_of(object.made);
-  DataSet data;
-  data.set(0x00080005, "CS", "ISO_IR 192");  // SpecificCharacterSet
-  data.set(0x00080012, "DA", made.date);     // InstanceCreationDate
-  data.set(0x00080013, "TM", made.time);
   const std::string_view sop_class = sop_class_of(object.kind);
-  data.set(0x00080016, "UI", sop_class);
-  data.set(0x00080018, "UI", object.sop_instance_uid);
-  add_patient_and_study(object.identity, data);
-  add_series_and_equipment(object, made, data);
+  DataSet data = derived_object({.identity = object.identity,
+                                 .sop_class = sop_class,
+                                 .sop_instance_uid = object.sop_instance_uid,
+                                 .modality = "M3D",
+                                 .series_uid = object.series_uid,
+                                 .series_number = object.series_number,
+                                 .instance_number = object.instance_number,
+                                 .title = object.title,
+                                 .made = object.made,
+                                 .station_name = object.station_name});
+  add_frame(object, data);
   add_references(object, data);
-  add_scanner(object.identity.equipment, data);
-  add_document(object, made, document_bytes, data);
+  add_document(object, document_bytes, data);
   add_model(object, data);
   const auto padded = static_cast<std::uint32_t>(document_bytes + document_bytes % 2);
   return {.before = file_head(sop_class, object.sop_instance_uid, kExplicitLittleEndian) +

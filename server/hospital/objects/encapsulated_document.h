@@ -23,7 +23,8 @@ enum class DocumentKind {
 
 std::string_view sop_class_of(DocumentKind kind);
 
-// "Encapsulated OBJ" for the SOP class of that storage. Throws Error kInternal for another class.
+// "Encapsulated OBJ" for the SOP class of that storage; also knows reports. Throws Error kInternal
+// for a class of which no objects are made.
 std::string_view name_of_class(std::string_view sop_class);
 
 // The largest even length of an element of explicit length.

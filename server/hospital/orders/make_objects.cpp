@@ -11,7 +11,9 @@
 #include "proto/json.h"
 #include "proto/parameters.h"
 #include "server/hospital/objects/encapsulated_document.h"
+#include "server/hospital/objects/measurement_report.h"
 #include "server/hospital/objects/uid.h"
+#include "server/hospital/orders/measure_surfaces.h"
 #include "server/jobs/library/label_pages.h"
 
 namespace isomesh::orders {
@@ -20,7 +22,7 @@ namespace {
 // The document of one object: a text, or the bytes of a file within a blob.
 struct Document {
   dicom::DocumentKind kind = dicom::DocumentKind::kStl;
-  MeshFormat format = MeshFormat::kStl;  // the format to send that it is made for
+  SendFormat format = SendFormat::kStl;
   std::optional<std::int64_t> label = {};
   std::string name = {};                     // name of the label
   std::optional<std::int64_t> segment = {};  // the label, also of an OBJ that has no other
@@ -64,13 +66,13 @@ std::vector<Document> obj_documents(const Job& job, const store::BlobStore& blob
   const auto obj = job.mesh->files.find(MeshFormat::kObj);
   if (obj == job.mesh->files.end()) return {};
   Document mesh = {.kind = dicom::DocumentKind::kObj,
-                   .format = MeshFormat::kObj,
+                   .format = SendFormat::kObj,
                    .blob = obj->second.sha256,
                    .bytes = obj->second.bytes,
                    .sha256 = obj->second.sha256};
   if (!job.parameters.labels) return {mesh};
   Document materials = {
-      .kind = dicom::DocumentKind::kMtl, .format = MeshFormat::kObj, .sha256 = {}, .number = 2};
+      .kind = dicom::DocumentKind::kMtl, .format = SendFormat::kObj, .sha256 = {}, .number = 2};
   const jobs::JobLabels labels(job, blobs);
   if (labels.count() == 1) mesh.segment = labels.after(std::nullopt).front().label;
   materials.text = jobs::materials_of(labels);
@@ -79,38 +81,39 @@ std::vector<Document> obj_documents(const Job& job, const store::BlobStore& blob
   return {materials, mesh};
 }
 
-bool is_sent_as(const store::OrderRecord& record, MeshFormat format) {
+bool is_sent_as(const store::OrderRecord& record, SendFormat format) {
   return std::ranges::find(record.order.send, format, &SendTarget::format) !=
          record.order.send.end();
 }
 
 // Only the parameters that determine the mesh, not the other requested files.
-std::string canonical_parameters(MeshParameters parameters, MeshFormat format) {
-  parameters.formats = {format};
+std::string canonical_parameters(MeshParameters parameters, SendFormat format) {
+  parameters.formats = {file_for(format)};
   parameters.draco = {};
   parameters.normals = false;
   return to_json(parameters);
 }
 
-std::string series_uid_of(const DicomIdentity& identity, const Job& job, MeshFormat format) {
-  return dicom::name_based_uid("series\n" + identity.study_uid + '\n' + identity.series_uid + '\n' +
+std::string series_uid_of(const DicomIdentity& identity, const Job& job, SendFormat format) {
+  const std::string kind = format == SendFormat::kSr ? "series of reports\n" : "series\n";
+  return dicom::name_based_uid(kind + identity.study_uid + '\n' + identity.series_uid + '\n' +
                                canonical_parameters(job.parameters, format) + '\n' +
                                ISOMESH_VERSION);
 }
 
-std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& identity,
-                            const Document& document) {
+// `content` tells what else the instance depends on.
+std::string instance_uid_of(const MadeObject& object, const DicomIdentity& identity,
+                            const std::string& content) {
   std::vector<std::string> sources;
   for (const DicomInstance& instance : identity.instances) {
     sources.push_back(instance.sop_instance_uid);
   }
   std::ranges::sort(sources);
-  std::string name =
-      "instance\n" + series_uid + '\n' + std::string(dicom::sop_class_of(document.kind)) + '\n';
+  std::string name = "instance\n" + object.series_uid + '\n' + object.sop_class_uid + '\n';
   for (const std::string& source : sources) name += source + '\n';
   // Two labels may have the same surface.
-  if (document.label) name += "label " + std::to_string(*document.label) + '\n';
-  return dicom::name_based_uid(name + document.sha256);
+  if (object.label) name += "label " + std::to_string(*object.label) + '\n';
+  return dicom::name_based_uid(name + content);
 }
 
 // Truncates to 64 characters, the limit of LO.
@@ -150,8 +153,7 @@ std::string description_of(const Job& job) {
 
 std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Document& document) {
   if (!document.segment) return std::nullopt;
-  const auto found = std::ranges::find(identity.segments, *document.segment, &DicomSegment::label);
-  if (found != identity.segments.end()) return *found;
+  if (auto known = find_segment(identity, *document.segment)) return known;
   DicomSegment uncoded;
   uncoded.label = *document.segment;
   return uncoded;
@@ -173,30 +175,29 @@ void write(const std::string& text, store::BlobWriter& to) {
   to.write(std::as_bytes(std::span(text)));
 }
 
-// All that the order sends. Throws if there is none.
+// The documents that the order sends. Throws if the surface is empty.
 std::vector<Document> documents_of(const store::OrderRecord& record, const Job& job,
                                    const store::BlobStore& blobs) {
   std::vector<Document> documents;
   if (job.mesh && job.mesh->triangles > 0) {
-    if (is_sent_as(record, MeshFormat::kStl)) documents = stl_documents(job, blobs);
-    if (is_sent_as(record, MeshFormat::kObj)) {
+    if (is_sent_as(record, SendFormat::kStl)) documents = stl_documents(job, blobs);
+    if (is_sent_as(record, SendFormat::kObj)) {
       std::ranges::move(obj_documents(job, blobs), std::back_inserter(documents));
     }
+    if (!documents.empty() || is_sent_as(record, SendFormat::kSr)) return documents;
   }
-  if (!documents.empty()) return documents;
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
 
 // Also sets the UIDs of `object`.
 dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
-                            const Document& document, const std::string& station_name,
-                            std::chrono::system_clock::time_point made, MadeObject& object) {
+                            const Document& document, const Making& making, MadeObject& object) {
   const DicomIdentity& identity = record.work.identity.value();
   object.format = document.format;
   object.label = document.label;
   object.sop_class_uid = dicom::sop_class_of(document.kind);
   object.series_uid = series_uid_of(identity, job, document.format);
-  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, document);
+  object.sop_instance_uid = instance_uid_of(object, identity, document.sha256);
   const std::string title =
       document.label ? record.work.label + ' ' + document.name : record.work.label;
   return dicom::make_envelope({.kind = document.kind,
@@ -206,14 +207,44 @@ dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
                                .series_number = record.work.series_number.value_or(0),
                                .instance_number = document.number,
                                .title = in_short(without_backslashes(title)),
-                               .made = made,
-                               .station_name = station_name,
+                               .made = making.made,
+                               .station_name = making.station_name,
                                .content_description = description_of(job),
                                .algorithm_parameters = without_backslashes(
                                    canonical_parameters(job.parameters, document.format)),
                                .segment = segment_of(identity, document),
                                .materials_uid = document.materials_uid},
                               document.size());
+}
+
+std::optional<dicom::Deviation> deviation_of(const Job& job) {
+  const auto& certificate = job.mesh->certificate;
+  if (!certificate) return std::nullopt;
+  return dicom::Deviation{.mm = certificate->bound_mm.value_or(certificate->found_mm),
+                          .is_bound = certificate->bound_mm.has_value()};
+}
+
+// The bytes of the report. Also sets the UIDs of `object`.
+std::string report_of(const store::OrderRecord& record, const Job& job, const Making& making,
+                      const store::BlobStore& blobs, MadeObject& object) {
+  const DicomIdentity& identity = record.work.identity.value();
+  object.format = SendFormat::kSr;
+  object.sop_class_uid = dicom::kEnhancedSrStorage;
+  object.series_uid = series_uid_of(identity, job, object.format);
+  dicom::MeasurementReport report = {
+      .identity = identity,
+      .series_uid = object.series_uid,
+      .sop_instance_uid = {},
+      .series_number = record.work.series_number.value_or(0),
+      .title = in_short(without_backslashes(record.work.label)),
+      .made = making.made,
+      .station_name = making.station_name,
+      .algorithm_parameters = canonical_parameters(job.parameters, object.format),
+      .deviation = deviation_of(job),
+      .surfaces = measure_surfaces(job, identity, record.work.label, blobs, making.stop)};
+  object.sop_instance_uid = instance_uid_of(object, identity, text_of(report.surfaces));
+  report.sop_instance_uid = object.sop_instance_uid;
+  return dicom::make_report(report);
 }
 
 std::uint64_t bytes_of(const dicom::Envelope& envelope, const Document& document) {
@@ -252,39 +283,51 @@ Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range)
 }
 
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
-                                     const std::string& station_name, std::uint64_t most_bytes,
-                                     std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs, std::vector<std::string>& stored) {
+                                     const Making& making, store::BlobStore& blobs,
+                                     std::vector<std::string>& stored) {
   std::vector<MadeObject> objects;
+  const auto commit = [&](store::BlobWriter& writer, MadeObject object) {
+    object.blob = writer.commit();
+    stored.push_back(object.blob.key);
+    objects.push_back(std::move(object));
+  };
   std::string materials_uid;
   for (Document& document : documents_of(record, job, blobs)) {
     if (document.kind == dicom::DocumentKind::kObj) document.materials_uid = materials_uid;
     MadeObject object;
-    const dicom::Envelope envelope = envelope_of(record, job, document, station_name, made, object);
+    const dicom::Envelope envelope = envelope_of(record, job, document, making, object);
     if (document.kind == dicom::DocumentKind::kMtl) materials_uid = object.sop_instance_uid;
     const std::uint64_t bytes = bytes_of(envelope, document);
-    if (bytes > most_bytes) throw_too_large(bytes, most_bytes, record.work);
+    if (bytes > making.most_bytes) throw_too_large(bytes, making.most_bytes, record.work);
     const auto writer = blobs.begin(record.owner);
     write(envelope.before, *writer);
     write(document.text, *writer);
     if (!document.blob.empty()) copy(*blobs.open(document.blob), document, *writer);
     write(envelope.after, *writer);
-    object.blob = writer->commit();
-    stored.push_back(object.blob.key);
-    objects.push_back(std::move(object));
+    commit(*writer, std::move(object));
+  }
+  if (is_sent_as(record, SendFormat::kSr)) {
+    MadeObject object;
+    const std::string report = report_of(record, job, making, blobs, object);
+    if (report.size() > making.most_bytes) {
+      throw_too_large(report.size(), making.most_bytes, record.work);
+    }
+    const auto writer = blobs.begin(record.owner);
+    write(report, *writer);
+    commit(*writer, std::move(object));
   }
   return objects;
 }
 
 std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
-                                                const std::string& station_name,
-                                                std::uint64_t most_bytes,
+                                                const Making& making,
                                                 const store::BlobStore& blobs) {
   constexpr std::uint64_t kTriangleBytes = 50;
+  const std::uint64_t most_bytes = making.most_bytes;
   double share = 1;
   for (const Document& document : documents_of(record, job, blobs)) {
     MadeObject object;
-    const dicom::Envelope envelope = envelope_of(record, job, document, station_name, {}, object);
+    const dicom::Envelope envelope = envelope_of(record, job, document, making, object);
     const std::uint64_t bytes = bytes_of(envelope, document);
     if (bytes <= most_bytes) continue;
     const std::uint64_t over = bytes - most_bytes + kGrowthOfText;
@@ -310,7 +353,9 @@ bool can_make_objects(const Job& job, const store::BlobStore& blobs, const std::
   return (!list || is_intact(list->sha256)) &&
          std::ranges::all_of(job.mesh->files, [&](const auto& file) {
            const auto& [format, entry] = file;
-           return (!is_sendable(format) && format != MeshFormat::kZip) || is_intact(entry.sha256);
+           const bool is_used = format == MeshFormat::kStl || format == MeshFormat::kObj ||
+                                format == MeshFormat::kZip;
+           return !is_used || is_intact(entry.sha256);
          });
 }
 

@@ -17,7 +17,7 @@
 namespace isomesh::orders {
 
 struct MadeObject {
-  MeshFormat format = MeshFormat::kStl;  // of the targets that it is for
+  SendFormat format = SendFormat::kStl;  // of the targets that it is for
   std::optional<std::int64_t> label;
   std::string sop_class_uid;
   std::string series_uid;
@@ -28,25 +28,30 @@ struct MadeObject {
 // Limit of objects of an order, over all PACS they are sent to: its record and its JSON list them.
 inline constexpr std::size_t kMostObjects = 500;
 
+struct Making {
+  std::string station_name;
+  std::uint64_t most_bytes = 0;  // of an object
+  std::chrono::system_clock::time_point made;
+  std::stop_token stop;
+};
+
 // Makes the objects of all formats that the order sends. STL: one, or one for each label. OBJ: one
-// of all labels, after the object of their materials. UIDs are
+// of all labels, after the object of their materials. SR: one report on all surfaces. UIDs are
 // derived from the content, so the same images with the same mesh always have the same UIDs.
 // `stored` gets the keys of the blobs, which no record names yet, also if it throws. Throws Error
-// kUnusableVolume for an empty surface, kTooLarge if an object exceeds `most_bytes`, and as
-// BlobWriter.
+// kUnusableVolume for an empty surface, kTooLarge if an object exceeds `most_bytes`, kCancelled,
+// and as BlobWriter.
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
-                                     const std::string& station_name, std::uint64_t most_bytes,
-                                     std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs, std::vector<std::string>& stored);
+                                     const Making& making, store::BlobStore& blobs,
+                                     std::vector<std::string>& stored);
 
 // The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
 Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);
 
-// The number of triangles with which no object exceeds `most_bytes`; empty if none does. Throws
-// Error kTooLarge if not even one triangle fits.
+// The number of triangles with which no mesh exceeds `most_bytes`; empty if none does. Throws Error
+// kTooLarge if not even one triangle fits.
 std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
-                                                const std::string& station_name,
-                                                std::uint64_t most_bytes,
+                                                const Making& making,
                                                 const store::BlobStore& blobs);
 
 // True if the blobs of the files from which objects are made are intact.

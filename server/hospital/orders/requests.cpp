@@ -38,13 +38,12 @@ void check_owner(const PacsSettings& pacs, const Orderer& orderer) {
   throw Error(ErrorCode::kForbidden, "this PACS can be used only by a rule");
 }
 
-// Objects are made from files of these formats, so these are requested too.
-void add_sent_formats(Order& order) {
+// Requests the files from which the objects are made.
+void add_sent_files(Order& order) {
   std::vector<MeshFormat>& formats = order.parameters.formats;
   for (const SendTarget& target : order.send) {
-    if (std::ranges::find(formats, target.format) == formats.end()) {
-      formats.push_back(target.format);
-    }
+    const MeshFormat file = file_for(target.format);
+    if (std::ranges::find(formats, file) == formats.end()) formats.push_back(file);
   }
 }
 
@@ -82,7 +81,7 @@ store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& o
     const PacsSettings& pacs = pacs_of(settings, target.pacs, "send.pacs");
     if (rule == nullptr || request.send) check_owner(pacs, orderer);
   }
-  add_sent_formats(order);
+  add_sent_files(order);
   record.owner = rule != nullptr && orderer.is_administrator && !rule->owner.empty() ? rule->owner
                                                                                      : orderer.name;
   record.work.label = rule == nullptr ? kLabel : rule->label;
@@ -101,7 +100,7 @@ store::OrderRecord make_order(const Rule& rule, const std::string& pacs,
   order.source = {.pacs = pacs, .study = series.study, .series = series.series};
   order.parameters = parse_order_parameters(rule.parameters, "", "parameters.");
   order.send = rule.send;
-  add_sent_formats(order);
+  add_sent_files(order);
   record.work.label = rule.label;
   record.work.series_number = rule.series_number;
   record.work.max_error_mm = rule.max_error_mm;

@@ -246,10 +246,8 @@ std::vector<SendTarget> read_send(Section& rule) {
     section.require("pacs", target.pacs);
     std::string format = "stl";
     section.read("format", format);
-    const auto known = from_string<MeshFormat>(format);
-    if (!known || !is_sendable(*known)) {
-      refuse(section.key_of("format"), "must be \"stl\" or \"obj\"");
-    }
+    const auto known = from_string<SendFormat>(format);
+    if (!known) refuse(section.key_of("format"), "must be " + names_of<SendFormat>());
     target.format = *known;
     section.finish();
     targets.push_back(std::move(target));

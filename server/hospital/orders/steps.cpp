@@ -45,13 +45,13 @@ void simplify(const OrderWork& work, JobParameters& parameters) {
   parameters.certify = true;
 }
 
-// An OBJ has all labels, and its materials are a second object.
+// An OBJ has all labels, and its materials are a second object. So has a report.
 void check_count_of_objects(const Order& order, const Job& job) {
-  constexpr std::uint64_t kOfObj = 2;
+  constexpr std::uint64_t kAtMost = 2;
   const std::uint64_t labels = job.mesh ? job.mesh->labels_count.value_or(1) : 0;
   std::uint64_t objects = 0;
   for (const SendTarget& target : order.send) {
-    objects += target.format == MeshFormat::kObj ? kOfObj : labels;
+    objects += target.format == SendFormat::kStl ? labels : kAtMost;
   }
   if (objects <= kMostObjects) return;
   throw Error(ErrorCode::kTooLarge,
@@ -234,6 +234,11 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   JobParameters parameters;
   static_cast<MeshParameters&>(parameters) = record.order.parameters;
   if (record.work.triangles) simplify(record.work, parameters);
+  // A report tells how far the mesh may be from the surface.
+  if (std::ranges::find(record.order.send, SendFormat::kSr, &SendTarget::format) !=
+      record.order.send.end()) {
+    parameters.certify = true;
+  }
   parameters.volume = *record.order.volume;
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;
@@ -302,23 +307,23 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::sto
       throw Error(ErrorCode::kUnavailable,
                   "the mesh is damaged or missing in the store; its job is repeated");
     }
-    std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
+    Making making = {.station_name = settings_.station_name,
+                     .most_bytes = std::numeric_limits<std::uint64_t>::max(),
+                     .made = job.finished ? time_of(*job.finished) : now_(),
+                     .stop = stop};
     for (const SendTarget& target : record.order.send) {
       const PacsSettings* pacs = settings_.find_pacs(target.pacs);
-      if (pacs != nullptr) most_bytes = std::min(most_bytes, pacs->max_send_bytes);
+      if (pacs != nullptr) making.most_bytes = std::min(making.most_bytes, pacs->max_send_bytes);
     }
     if (record.work.max_error_mm && !record.work.triangles) {
-      const auto triangles =
-          triangles_that_fit(record, job, settings_.station_name, most_bytes, services_.blobs);
+      const auto triangles = triangles_that_fit(record, job, making, services_.blobs);
       if (triangles) {
         record.work.triangles = *triangles;
         record.order.job.reset();
         return save_after(OrderState::kMeshing, record, now_());
       }
     }
-    const Time made = job.finished ? time_of(*job.finished) : now_();
-    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs,
-                           stored);
+    objects = make_objects(record, job, making, services_.blobs, stored);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {

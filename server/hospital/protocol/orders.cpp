@@ -107,6 +107,10 @@ constexpr std::array kStates = {
     std::pair{OrderState::kSucceeded, "succeeded"}, std::pair{OrderState::kFailed, "failed"},
     std::pair{OrderState::kCancelled, "cancelled"}};
 
+constexpr std::array kSendFormats = {std::pair{SendFormat::kStl, "stl"},
+                                     std::pair{SendFormat::kObj, "obj"},
+                                     std::pair{SendFormat::kSr, "sr"}};
+
 constexpr std::string_view kFormats = "formats";
 
 Json object_of(std::string_view text, const std::string& what) {
@@ -127,12 +131,6 @@ void check(const Json& json, const OrderRequest& request, RequestReader& reader)
   }
   if (json.contains(Json::json_pointer("/source/instances"))) {
     reader.add("source.instances", "is not a known member");
-  }
-  for (const SendTarget& target : request.send.value_or(std::vector<SendTarget>())) {
-    if (!is_sendable(target.format)) {
-      reader.add("send.format",
-                 "must be \"stl\" or \"obj\": no other format can be sent to a PACS");
-    }
   }
   for (const char* name : {"parameters", "send"}) {
     if (!request.rule && !json.contains(name)) {
@@ -160,8 +158,25 @@ bool is_final(OrderState state) {
          state == OrderState::kCancelled;
 }
 
-bool is_sendable(MeshFormat format) {
-  return format == MeshFormat::kStl || format == MeshFormat::kObj;
+std::string_view to_string(SendFormat value) {
+  return kSendFormats[static_cast<std::size_t>(value)].second;
+}
+
+template <>
+std::optional<SendFormat> from_string(std::string_view name) {
+  for (const auto& [format, known] : kSendFormats) {
+    if (name == known) return format;
+  }
+  return std::nullopt;
+}
+
+template <>
+std::string names_of<SendFormat>() {
+  return R"("stl", "obj" or "sr")";
+}
+
+MeshFormat file_for(SendFormat format) {
+  return format == SendFormat::kObj ? MeshFormat::kObj : MeshFormat::kStl;
 }
 
 std::string to_json(const Order& order) { return json_values::to_text(order); }

@@ -41,13 +41,26 @@ struct OrderSource {
 // SOP class of most objects that orders make: those of STL.
 inline constexpr std::string_view kEncapsulatedStlStorage = "1.2.840.10008.5.1.4.1.1.104.3";
 
-// True if DICOM objects are made from meshes of the format: stl, obj.
-bool is_sendable(MeshFormat format);
+// The kinds of DICOM objects that orders make.
+enum class SendFormat {
+  kStl,  // Encapsulated STL: one, or one for each label
+  kObj,  // Encapsulated OBJ of all labels, and their materials
+  kSr,   // a structured report of measurements on the meshes
+};
 
-// The destination and the format of a mesh.
+std::string_view to_string(SendFormat value);
+template <>
+std::optional<SendFormat> from_string(std::string_view name);
+template <>
+std::string names_of<SendFormat>();
+
+// The file of a mesh from which such objects are made.
+MeshFormat file_for(SendFormat format);
+
+// The destination and the kind of objects.
 struct SendTarget {
   std::string pacs;
-  MeshFormat format = MeshFormat::kStl;  // is_sendable
+  SendFormat format = SendFormat::kStl;
 
   bool operator==(const SendTarget&) const = default;
 };
@@ -55,7 +68,7 @@ struct SendTarget {
 // One DICOM object for one PACS.
 struct OrderResult {
   std::string pacs;
-  MeshFormat format = MeshFormat::kStl;
+  SendFormat format = SendFormat::kStl;
   std::optional<std::int64_t> label = {};  // of an order by labels, for an object of one label
   std::string sop_class_uid{kEncapsulatedStlStorage};
   std::string series_uid;

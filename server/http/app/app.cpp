@@ -102,7 +102,7 @@ std::optional<Continuation> checked_answer(App& app, Request& request, Response&
   allow_reading(app.rules, request, response);
   if (is_of_foreign_page(app.rules, request)) app.refused_origins.tell(request.header("Origin"));
   check_origin(app.rules, request);
-  begin_request(app.tokens, request, response);
+  begin_request(app.logins, request, response);
   check_request(request);
   const Route& route = route_of(app.router, request);
   if (is_preflight(app.rules, request)) {

@@ -25,7 +25,7 @@ struct App {
 
   Services services;
   ServerOptions options;
-  const Tokens* tokens = services.tokens;  // null: no authentication
+  const Logins logins{services.tokens, services.provider};
   Metrics& metrics = services.metrics;
   net::FairPlaces uploads;
   KeptUploads kept;

@@ -11,6 +11,7 @@
 #include "server/http/guards/proxies.h"
 #include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
+#include "server/http/oidc/provider.h"
 #include "server/http/requests/upload.h"
 #include "server/jobs/library/histograms.h"
 #include "server/jobs/library/label_lists.h"
@@ -65,8 +66,10 @@ struct Services {
   Metrics& metrics;
   callbacks::Callbacks& callbacks;
   const callbacks::CallbackTargets& callback_targets;
-  const Tokens* tokens = nullptr;  // null: requests are not authenticated
-  Wing* wing = nullptr;            // null: the build has none
+  // Without both, requests are not authenticated.
+  const Tokens* tokens = nullptr;
+  const oidc::Provider* provider = nullptr;
+  Wing* wing = nullptr;  // null: the build has none
 };
 
 }  // namespace isomesh::http

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <optional>
+#include <utility>
 
 #include "base/log.h"
 #include "proto/error.h"
@@ -15,15 +16,18 @@ bool is_below(std::string_view path, std::string_view folder) {
 }
 
 // Throws the same error for missing, malformed and unknown tokens, to give attackers no
-// information.
-Caller caller_of(const Tokens& tokens, const Request& request) {
-  std::optional<Caller> caller;
-  if (request.count_headers("Authorization") == 1) {
-    const auto token = bearer_of(request.header("Authorization"));
-    if (token) caller = tokens.find(*token);
+// information. Errors about a token of the provider tell its owner what to do.
+Caller caller_of(const Logins& logins, const Request& request) {
+  std::optional<std::string> token;
+  if (request.count_headers("Authorization") == 1)
+    token = bearer_of(request.header("Authorization"));
+  if (token && logins.tokens != nullptr) {
+    if (const auto caller = logins.tokens->find(*token)) return *caller;
   }
-  if (!caller) throw Error(ErrorCode::kUnauthorized, "this request needs a valid token");
-  return *caller;
+  if (token && logins.provider != nullptr && oidc::is_web_token(*token)) {
+    return logins.provider->login_of(*token).caller;
+  }
+  throw Error(ErrorCode::kUnauthorized, "this request needs a valid token");
 }
 
 void check_role(Role role, bool is_metrics) {
@@ -48,28 +52,37 @@ std::string party_of(const Request& request) {
   return owner.empty() ? net::party_of(request.remote_address) : "owner " + owner;
 }
 
-void begin_request(const Tokens* tokens, Request& request, Response& response) {
+void begin_request(const Logins& logins, Request& request, Response& response) {
   RequestContext& context = request.context;
   context.trace = continue_trace(request.header("traceparent"));
   response.set_header("X-Request-Id", context.trace.request_id());
-  if (tokens == nullptr) return;
+  if (!logins.are_required()) return;
   context.caller = {"", Role::kUser};
   const bool is_metrics = request.path == "/metrics";
   // Browsers send preflight requests (OPTIONS) without the token.
   if (request.method == "OPTIONS" || (!is_metrics && !is_below(request.path, "/v1"))) return;
   try {
-    context.caller = caller_of(*tokens, request);
-  } catch (const Error&) {
-    response.set_header("WWW-Authenticate", "Bearer realm=\"isomesh\"");
+    context.caller = caller_of(logins, request);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kUnauthorized) {
+      response.set_header("WWW-Authenticate", "Bearer realm=\"isomesh\"");
+    }
     throw;
   }
   check_role(context.caller.role, is_metrics);
 }
 
-std::function<bool()> validity_of(const Tokens* tokens, const Request& request) {
-  if (tokens == nullptr) return [] { return true; };
-  return [tokens, caller = request.context.caller,
-          token = bearer_of(request.header("Authorization")).value_or(""),
+std::function<bool()> validity_of(
+    const Logins& logins, const Request& request,
+    const std::function<std::chrono::system_clock::time_point()>& now) {
+  if (!logins.are_required()) return [] { return true; };
+  std::string token = bearer_of(request.header("Authorization")).value_or("");
+  const Caller& caller = request.context.caller;
+  if (logins.tokens == nullptr || logins.tokens->find(token) != caller) {
+    // It has just been accepted; what is left to happen to it is that it expires.
+    return [now, expires = logins.provider->login_of(token).expires] { return now() < expires; };
+  }
+  return [tokens = logins.tokens, caller, token = std::move(token),
           checked = std::uint64_t{0}]() mutable {
     const std::uint64_t loads = tokens->loads();
     if (checked == loads) return true;

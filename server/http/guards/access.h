@@ -2,12 +2,14 @@
 // to server/http.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <string>
 
 #include "server/http/connections/connections.h"
 #include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
+#include "server/http/oidc/provider.h"
 #include "server/http/requests/request.h"
 #include "server/http/requests/response.h"
 #include "server/store/job_store.h"
@@ -24,14 +26,24 @@ store::Viewer viewer_of(const Request& request);
 // without tokens; "" for a Unix socket without tokens.
 std::string party_of(const Request& request);
 
-// Assigns the request's trace, returned as X-Request-Id, and authenticates it. `tokens` is null if
-// none are configured. Call before routing. Throws Error kUnauthorized, and kForbidden if the
-// caller's role does not permit the route.
-void begin_request(const Tokens* tokens, Request& request, Response& response);
+// The ways to authenticate, which are used beside each other. Without any, nobody needs to.
+struct Logins {
+  const Tokens* tokens = nullptr;            // null: none are configured
+  const oidc::Provider* provider = nullptr;  // null: none is configured
 
-// A check of whether the request's token is still valid, for responses that last. Always true if
-// `tokens` is null. It must not outlive `tokens`.
-std::function<bool()> validity_of(const Tokens* tokens, const Request& request);
+  bool are_required() const { return tokens != nullptr || provider != nullptr; }
+};
+
+// Assigns the request's trace, returned as X-Request-Id, and authenticates it. Call before routing.
+// Throws Error kUnauthorized, kForbidden if the caller's role does not permit the route, and
+// kUnavailable as the provider does.
+void begin_request(const Logins& logins, Request& request, Response& response);
+
+// A check of whether the request's token is still valid, for responses that last. Always true
+// without logins. It must not outlive them.
+std::function<bool()> validity_of(const Logins& logins, const Request& request,
+                                  const std::function<std::chrono::system_clock::time_point()>&
+                                      now = std::chrono::system_clock::now);
 
 void end_request(Metrics& metrics, const Request& request, const Response& response,
                  const BodySizes& sizes);

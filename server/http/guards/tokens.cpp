@@ -50,25 +50,6 @@ void check_only_owner_writes(const std::filesystem::path& file, ReadBy reader) {
 
 bool may_own_tokens(uid_t owner, uid_t service) { return owner == 0 || owner == service; }
 
-std::string_view to_string(Role role) {
-  switch (role) {
-    case Role::kUser:
-      return "user";
-    case Role::kAdmin:
-      return "admin";
-    case Role::kMonitor:
-      return "monitor";
-  }
-  return {};
-}
-
-std::optional<Role> role_from(std::string_view name) {
-  for (const Role role : {Role::kUser, Role::kAdmin, Role::kMonitor}) {
-    if (to_string(role) == name) return role;
-  }
-  return std::nullopt;
-}
-
 Tokens::Tokens(const std::filesystem::path& file, ReadBy reader)
     : file_(file), reader_(reader), entries_(std::make_shared<const Entries>(read())) {}
 

@@ -18,9 +18,6 @@
 
 namespace isomesh::http {
 
-std::string_view to_string(Role role);
-std::optional<Role> role_from(std::string_view name);
-
 // The reader of a file of tokens: the service, or an administrator, who may be root while the
 // service runs as the user who owns the file.
 enum class ReadBy { kService, kAdministrator };

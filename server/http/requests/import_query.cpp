@@ -21,7 +21,8 @@ const std::set<std::string>& raw_parameters() {
 
 // Parameters that select within a file; raw samples have nothing to select.
 const std::set<std::string>& file_parameters() {
-  static const std::set<std::string> names = {"series", "member", "volume", "accept", "nifti_form"};
+  static const std::set<std::string> names = {"series", "member", "masks",
+                                              "volume", "accept", "nifti_form"};
   return names;
 }
 
@@ -146,6 +147,7 @@ ImportOptions import_options_of(const Request& request) {
   }
   take("series", series_of, options.series);
   take("member", member_of, options.member);
+  options.masks = flag_of(request, "masks", false);
   take("volume", volume_of, options.volume);
   take("accept", accepted_of, options.accept);
   take("nifti_form", nifti_form_of, options.nifti_form);

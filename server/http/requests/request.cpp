@@ -84,4 +84,23 @@ Trace continue_trace(std::string_view traceparent) {
           random.substr(kTraceDigits)};
 }
 
+std::string_view to_string(Role role) {
+  switch (role) {
+    case Role::kUser:
+      return "user";
+    case Role::kAdmin:
+      return "admin";
+    case Role::kMonitor:
+      return "monitor";
+  }
+  return {};
+}
+
+std::optional<Role> role_from(std::string_view name) {
+  for (const Role role : {Role::kUser, Role::kAdmin, Role::kMonitor}) {
+    if (to_string(role) == name) return role;
+  }
+  return std::nullopt;
+}
+
 }  // namespace isomesh::http

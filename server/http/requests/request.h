@@ -33,6 +33,9 @@ enum class Role {
   kMonitor,  // only the metrics
 };
 
+std::string_view to_string(Role role);
+std::optional<Role> role_from(std::string_view name);
+
 // Without tokens every caller is an unnamed administrator.
 struct Caller {
   std::string name;

@@ -167,14 +167,14 @@ void events(App& app, const Request& request, Response& response) {
                               .result = [&jobs = app.services.jobs, who = viewer_of(request),
                                          id] { return to_json(jobs.get(who, id)); },
                               .place = std::move(place),
-                              .may_listen = validity_of(app.tokens, request)}));
+                              .may_listen = validity_of(app.logins, request)}));
 }
 
 void all_events(App& app, const Request& request, Response& response) {
   check_known(request, {});
   auto place = app.streams.take(party_of(request));
   answer_events(response, event_source(app.events.listen_to_all(viewer_of(request)),
-                                       std::move(place), validity_of(app.tokens, request)));
+                                       std::move(place), validity_of(app.logins, request)));
 }
 
 }  // namespace

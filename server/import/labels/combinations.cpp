@@ -36,7 +36,7 @@ Combinations::State Combinations::with(State state, std::uint32_t label) {
   if (is_new) {
     if (nodes_.size() == kMostStates) {
       throw_unusable("The segments overlap in more than " + std::to_string(kMostStates) +
-                     " combinations. Choose one segment with volume=N.");
+                     " combinations. Choose one segment with volume=N, or send fewer masks.");
     }
     nodes_.push_back({.parent = state, .label = label, .size = nodes_[state].size + 1});
   }
@@ -52,7 +52,8 @@ std::uint32_t Combinations::next_value() {
   if (next_value_ > kMostValues) {
     throw_unusable("The segments and their overlaps need more than the " +
                    std::to_string(kMostValues) +
-                   " values that are available. Choose one segment with volume=N.");
+                   " values that are available. Choose one segment with volume=N, or send fewer "
+                   "masks.");
   }
   return next_value_++;
 }
@@ -77,7 +78,7 @@ std::vector<LabelEntry> Combinations::entries(std::vector<LabelEntry> named) con
     if (count > Volume::kMostLabels * 16) {
       throw_unusable(
           "The segments overlap in too many combinations to list. Choose one segment with "
-          "volume=N.");
+          "volume=N, or send fewer masks.");
     }
     for (const Node* part = &node; part->size > 0; part = &nodes_[part->parent]) {
       values[part->label].push_back(node.value);

@@ -19,6 +19,7 @@ void visit(Is<ImportOptions> auto& self, auto&& field) {
   field("series", self.series);
   field("volume", self.volume);
   field("member", self.member);
+  field("masks", self.masks);
   field("accept", self.accept);
   field("nifti_form", self.nifti_form);
   field("modality", self.modality);

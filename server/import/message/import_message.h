@@ -35,6 +35,7 @@ struct ImportOptions {
   // The archive's member to read, or kDicomMember for the volume of its DICOM files; empty: the
   // only one.
   std::string member = {};
+  bool masks = false;                        // the archive's volumes are masks (masks.h)
   std::vector<std::string> accept = {};      // names of notes whose errors are overridden
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
   // Millimetres along x, y and z, for a file that gives none.

@@ -2,14 +2,11 @@
 #pragma once
 
 #include "proto/types.h"
+#include "server/jobs/library/defaults.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/store/job_store.h"
 
 namespace isomesh::jobs {
-
-// Replaces the name of a preset by its value. Throws Error kInvalidParameter, which lists the
-// volume's presets, if it has none with that name.
-void resolve_preset(MeshParameters& parameters, const Volume& volume);
 
 // Completes parameters that have labels: the names, colours and values of the chosen labels from
 // the volume, unless given, and the default displacement limit of Laplacian and Taubin smoothing,

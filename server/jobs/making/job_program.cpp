@@ -25,8 +25,8 @@
 #include "server/jobs/library/label_pages.h"
 #include "server/jobs/making/crop.h"
 #include "server/jobs/making/job_message.h"
-#include "server/jobs/making/make_labels.h"
 #include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/make_samples.h"
 #include "server/jobs/making/memory.h"
 #include "server/jobs/making/spool_file.h"
 #include "server/mesh/parallel.h"
@@ -34,7 +34,6 @@
 #include "server/process/passing.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
-#include "server/volume/labels.h"
 
 namespace {
 
@@ -51,9 +50,6 @@ std::uint64_t kept_bytes(std::uint64_t memory_bytes) {
 constexpr std::uint64_t kHeadroomBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kThreadBytes = std::uint64_t{16} << 20;
 constexpr std::chrono::milliseconds kBetweenReports{20};
-// The bytes of 64^3 samples. So small a job uses one thread; jobs side by side keep the processors
-// busy.
-constexpr std::uint64_t kFewSampleBytes = std::uint64_t{1} << 18;
 
 // The daemon's end of the socket. Lines and pieces are sent whole, from any thread. Thread safe.
 class Speaker {
@@ -103,9 +99,9 @@ struct Task {
   Descriptor file;
 };
 
-// `volume` is the order's, maybe with more notes. Both must outlive the request.
-MeshRequest request_of(const JobOrder& order, const Volume& volume) {
-  return {.volume = volume,
+// The order must outlive the request.
+MeshRequest request_of(const JobOrder& order) {
+  return {.volume = order.volume,
           .parameters = order.parameters,
           .iso = order.iso,
           .certify = order.certify,
@@ -215,23 +211,12 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Place& p
   for (std::size_t i = 0; i < files_of(order.parameters).size(); ++i) {
     sinks.push_back(sink_of(speaker, i));
   }
-  std::optional<mesh::OneThread> alone;
-  if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
-  MadeMesh made;
-  const CroppedSamples cropped(array_of(canonical), order.parameters);
-  Volume volume = order.volume;
-  if (cropped.is_rounded()) volume.notes.push_back(volume::rounded_note(canonical.header().type));
-  MeshRequest request = request_of(order, volume);
-  const SampleArray& samples = cropped.array();
-  request.memory_bytes -= std::min(request.memory_bytes, cropped.rounded_bytes());
+  MeshRequest request = request_of(order);
   if (place.spool) request.spool = &*place.spool;
-  if (order.parameters.labels) {
-    MadeLabels labels = make_labels(samples, request, sinks, progress, place.workspace.walls);
-    made.summary = std::move(labels.summary);
-    send_lists(speaker, sinks.size(), labels.walls, made.summary);
-  } else {
-    made.summary = make_mesh(samples, request, sinks, progress, place.workspace.mesh);
-  }
+  MadeLabels labels =
+      make_from_samples(array_of(canonical), request, sinks, progress, place.workspace);
+  MadeMesh made = {.summary = std::move(labels.summary), .timing = {}};
+  if (order.parameters.labels) send_lists(speaker, sinks.size(), labels.walls, made.summary);
   progress.end_stage();
   made.timing = progress.timing();
   return made;
@@ -244,7 +229,7 @@ CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
   const CroppedSamples cropped(array_of(canonical), parameters);
   const SampleArray& samples = cropped.array();
   if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
-  return count_surface(samples, request_of(task.order, task.order.volume), {stop, nullptr});
+  return count_surface(samples, request_of(task.order), {stop, nullptr});
 }
 
 struct Ending {

@@ -46,28 +46,27 @@ mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& lab
   return options;
 }
 
-mesh::SurfaceCount separate(const SampleArray& samples, const mesh::SeparateOptions& options,
-                            const MeshRequest& request, const Progress& progress,
-                            mesh::SeparatingSurface& walls) {
-  return with_label(samples.type, [&](auto sample) {
+void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
+              const MeshRequest& request, const Progress& progress,
+              mesh::SeparatingSurface& walls) {
+  with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::Context context = progress.context();
-    mesh::SurfaceCount count = count_walls(lattice, options, context.part(0.2, 0.4));
+    const mesh::SurfaceCount count = count_walls(lattice, options, context.part(0.2, 0.4));
     check_memory(size_of(count), lattice.dims.samples(), request);
     extract_walls(lattice, options, count, context.part(0.4, 1), walls);
-    return count;
   });
 }
 
 void smooth_walls(const SampleArray& samples, const mesh::SeparateOptions& options,
-                  const mesh::SurfaceCount& count, const MeshRequest& request, Progress& progress,
-                  mesh::SeparatingSurface& walls, MeshSummary& summary) {
+                  const MeshRequest& request, Progress& progress, mesh::SeparatingSurface& walls,
+                  MeshSummary& summary) {
   if (!removes_stairs(request.parameters)) {
     return smooth_stage(samples, request, progress, walls.mesh, summary);
   }
   const auto remove = [&](const mesh::Context& context) {
     return with_label(samples.type, [&](auto sample) {
-      return remove_stairs(lattice_of<decltype(sample)>(samples), options, count,
+      return remove_stairs(lattice_of<decltype(sample)>(samples), options,
                            most_displacement(request.parameters), context, walls);
     });
   };
@@ -167,12 +166,12 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   const auto labels =
       mesh::chosen_labels(count_values(samples, progress.context().part(0, 0.2)), parameters);
   const mesh::SeparateOptions options = separate_options(labels, parameters);
-  const mesh::SurfaceCount count = separate(samples, options, request, progress, walls);
+  separate(samples, options, request, progress, walls);
   if (!is_simplified(parameters)) check_disk(size_of(walls.mesh), request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
   ExtractedSurface extracted(request, walls.mesh);
 
-  smooth_walls(samples, options, count, request, progress, walls, summary);
+  smooth_walls(samples, options, request, progress, walls, summary);
   untangle_stage(parameters, extracted, progress, walls.mesh, summary);
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);

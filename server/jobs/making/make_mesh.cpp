@@ -140,11 +140,15 @@ void Workspace::trim(std::size_t budget_bytes) {
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
-  if (is_walked(parameters, request.certify)) return walk_stage(samples, request, sinks, progress);
+  if (can_be_walked(parameters, request.certify)) {
+    auto walked = walk_stage(samples, request, sinks, progress, mesh);
+    if (walked) return *std::move(walked);
+  } else {
+    progress.enter(Stage::kExtract);
+    extract(samples, request, progress, mesh);
+  }
   MeshSummary summary;
   summary.iso = request.iso;
-  progress.enter(Stage::kExtract);
-  extract(samples, request, progress, mesh);
   leave_out_parts(parameters, progress, mesh, summary.dropped);
   if (!is_simplified(parameters)) check_disk(size_of(mesh), request);
   ExtractedSurface extracted(request, mesh);

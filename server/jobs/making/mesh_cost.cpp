@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "server/codec/facet_file.h"
 #include "server/codec/formats.h"
+#include "server/codec/walked_file.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/mesh/labels/label_parts.h"
 #include "server/mesh/labels/separate.h"
@@ -21,26 +22,34 @@ std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
   return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle);
 }
 
-// The memory of a job that never has the surface as a whole: the walk, the joined crossings that
-// are counted and not set aside yet, and for each thread the parts of files that wait for their
-// turn and the corners of some layers' triangles, whose fans it looks at.
+// The memory of a job that never has the surface as a whole: the walk, its files, the joined
+// crossings until they are set aside, and for each thread the corners of some layers'
+// triangles, whose fans it looks at.
 std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                            const MeshParameters& parameters) {
-  constexpr std::uint64_t kJoinedPerVertex = 3;
-  constexpr std::uint64_t kParts = std::uint64_t{6} << 20;
+  // With the room that arrays grow into.
+  constexpr std::uint64_t kJoinedPerVertex = 16;
   constexpr std::uint64_t kCornersPerVertex = 5 * 2 * 3 * 8;
   const std::uint64_t planes = std::max<std::uint64_t>(1, surface.layers);
   const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
-  return mesh::walking_memory(smooth_options(parameters), surface, samples / planes) +
-         (parameters.regularize ? surface.vertices * kJoinedPerVertex : 0) +
-         threads * (kParts + std::min(surface.vertices, surface.largest_layer) * kCornersPerVertex);
+  std::uint64_t files = 0;
+  for (const MeshFormat format : files_of(parameters)) {
+    files += codec::walked_memory(format, parameters, surface, sets_aside(samples));
+  }
+  const std::uint64_t layer = std::min(surface.vertices, surface.largest_layer);
+  const std::uint64_t joining = sets_aside(samples) ? threads * layer : surface.vertices;
+  return mesh::walking_memory(walk_options(smooth_options(parameters), parameters, surface),
+                              surface, samples / planes) +
+         files + threads * layer * kCornersPerVertex +
+         (parameters.regularize ? joining * kJoinedPerVertex : 0);
 }
 
-// The memory of labels beside their walls: the sides of the triangles, the lists of each label's
-// triangles and, at worst, all labels' own surfaces at once. A triangle is in two of them at most.
+// The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,
+// the lists of each label's triangles and, at worst, all labels' own surfaces at once. A triangle
+// is in two of them at most.
 std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
   return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
-         2 * mesh_bytes(surface);
+         surface.vertices * sizeof(mesh::VertexOwner) + 2 * mesh_bytes(surface);
 }
 
 // The memory of untangling, simplifying and certifying, one after the other, beside the rest: the
@@ -98,12 +107,24 @@ bool is_regularized(const MeshParameters& parameters) {
   return parameters.regularize && (parameters.labels || !parameters.max_error_mm);
 }
 
-bool is_walked(const MeshParameters& parameters, bool certify) {
+bool can_be_walked(const MeshParameters& parameters, bool certify) {
   const bool is_whole = parameters.labels || certify || parameters.max_error_mm ||
                         parameters.triangles || parameters.untangle || parameters.fill_cavities ||
                         !parameters.components.keeps_all();
-  return !is_whole && mesh::can_walk(smooth_options(parameters)) &&
-         std::ranges::all_of(files_of(parameters), codec::facet_file_of);
+  // Without files, the caller wants the mesh itself.
+  return !is_whole && !parameters.formats.empty() && mesh::can_walk(smooth_options(parameters)) &&
+         std::ranges::all_of(files_of(parameters), [&](MeshFormat format) {
+           return codec::is_walked(format, parameters);
+         });
+}
+
+bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters, bool certify) {
+  constexpr std::uint64_t kFewTriangles = std::uint64_t{1} << 21;
+  if (!can_be_walked(parameters, certify)) return false;
+  const std::uint64_t depth = walk_options({}, parameters, surface).depth;
+  const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
+  return threads == 1 || depth == 0 || surface.triangles >= kFewTriangles ||
+         surface.layers >= 2 * threads * depth;
 }
 
 bool removes_stairs(const MeshParameters& parameters) {
@@ -119,9 +140,24 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
           .max_displacement_mm = most_displacement(parameters)};
 }
 
+mesh::WalkOptions walk_options(mesh::SmoothOptions smooth, const MeshParameters& parameters,
+                               const mesh::SurfaceSize& surface) {
+  mesh::WalkOptions options = {.smooth = std::move(smooth)};
+  for (const MeshFormat format : files_of(parameters)) {
+    options.depth = std::max(options.depth, codec::walked_depth(format, parameters, surface));
+    options.normals |= format == MeshFormat::kGlb && parameters.normals;
+  }
+  return options;
+}
+
+bool sets_aside(std::uint64_t samples) {
+  constexpr std::uint64_t kFewSamples = std::uint64_t{1} << 22;
+  return samples > kFewSamples;
+}
+
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                               const MeshParameters& parameters, bool certify) {
-  if (is_walked(parameters, certify)) return walked_bytes(surface, samples, parameters);
+  if (is_walked(surface, parameters, certify)) return walked_bytes(surface, samples, parameters);
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);

@@ -7,6 +7,7 @@
 #include "server/jobs/making/make_mesh.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/smooth/smooth.h"
+#include "server/mesh/walk/walk.h"
 
 namespace isomesh::jobs {
 
@@ -20,9 +21,21 @@ bool removes_stairs(const MeshParameters& parameters);
 // For all other methods of smoothing.
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 
-// True if a job at an iso-value is made window by window (server/mesh/walk): its files can be
+// True if a job at an iso-value can be made window by window (server/mesh/walk): its files can be
 // written as triangles come, and nothing else needs the surface as a whole.
-bool is_walked(const MeshParameters& parameters, bool certify);
+bool can_be_walked(const MeshParameters& parameters, bool certify);
+
+// True if such a job is made so. A small surface of few windows would not keep all threads busy: it
+// is made as a whole, which gives the same.
+bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters, bool certify);
+
+// The options of that walk.
+mesh::WalkOptions walk_options(mesh::SmoothOptions smooth, const MeshParameters& parameters,
+                               const mesh::SurfaceSize& surface);
+
+// True if a walk through so many samples sets things aside on the disk. Of few, they take less time
+// in memory.
+bool sets_aside(std::uint64_t samples);
 
 // An upper estimate of a job's peak memory beside its mapped volume: mesh, smoothing, encoders,
 // simplifying and certifying. For a surface of that size in a volume of so many samples.

@@ -63,6 +63,7 @@ void SpoolFile::read(std::uint64_t at, std::span<std::byte> bytes) const {
 }
 
 void SpoolFile::clear() {
+  begin_again();
   if (::ftruncate(file_.number(), 0) != 0) fail("ftruncate", errno);
 }
 

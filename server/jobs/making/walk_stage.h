@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "server/codec/encode.h"
@@ -11,9 +12,11 @@
 
 namespace isomesh::jobs {
 
-// Makes the mesh of a job that is_walked(). Files begin when the surface has been counted. The
-// summary and the bytes are those of a mesh that is made as a whole. Throws as make_mesh.
-MeshSummary walk_stage(const SampleArray& samples, const MeshRequest& request,
-                       std::span<const codec::Sink> sinks, Progress& progress);
+// Makes the mesh of a job that can_be_walked(). Files begin when the surface has been counted. The
+// summary and the bytes are those of a mesh that is made as a whole. Only extracts the surface,
+// into `mesh`, and returns nothing if it is not worth a walk (is_walked). Throws as make_mesh.
+std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequest& request,
+                                      std::span<const codec::Sink> sinks, Progress& progress,
+                                      mesh::Mesh& mesh);
 
 }  // namespace isomesh::jobs

@@ -186,7 +186,6 @@ class BccField {
   static constexpr std::size_t kPlaces = kBccPlaces;
   static constexpr bool kHasLines = false;
   static constexpr bool kHasClusters = false;
-  static constexpr bool kPlacesVertices = true;
   // As in SignField. Samples and centres have clusters, and edges in the border are in none.
   static constexpr std::size_t kKinds = 2;
   static constexpr std::size_t kJoinedPlaces = kBccDiagonalSlot;

@@ -21,6 +21,7 @@
 #include <hwy/highway.h>
 
 #include "server/mesh/extract/clusters.h"
+#include "server/mesh/extract/crossed_rows.h"
 #include "server/mesh/extract/links.h"
 #include "server/mesh/extract/slabs.h"
 #include "server/mesh/lattice/rows-inl.h"
@@ -103,6 +104,7 @@ struct CountedLayer {
   ClusterLayer clusters;
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
+  CrossedRows crossed;
 
   void begin_row() {
     clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.words.size()));
@@ -120,6 +122,7 @@ struct CountedLayer {
     clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.words.size()));
     if (clusters.words.empty()) clusters = {};
     count.clusters[z] = std::move(clusters);
+    count.crossed[z] = crossed;
     count.layer_vertices[z + 1] = vertices;
     count.layer_triangles[z + 1] = triangles;
   }
@@ -196,7 +199,7 @@ class ClusterWalk {
 
   // The rule of a sample looks at the edges that samples of the plane below own, and at what the
   // samples there might join.
-  void count() {
+  void count(const LayerEnded& ended = {}) {
     if (first_plane_ < slab_.end) rule_.open(first_plane_);
     for (std::uint32_t z = first_plane_; z < slab_.end; ++z) {
       rule_.reach(z);
@@ -213,6 +216,7 @@ class ClusterWalk {
       if (z < slab_.begin) continue;
       if (kKinds > 1) find_clusters(dims_.y - 1, z);
       layer_.end(z, count_);
+      if (ended) ended(z);
     }
   }
 
@@ -224,11 +228,14 @@ class ClusterWalk {
   // Splits the crossed edges that the row's samples own by the end that each belongs to.
   void find_edges(std::uint32_t y, std::uint32_t z) {
     Edges* out = edges(y, z);
+    OwnersOfRow owners;
     for (std::size_t w = 0; w < words_; ++w) {
       const WordCount plain = rule_.split_edges(w, y, z, out[w]);
       layer_.vertices += plain.vertices;
       layer_.triangles += plain.triangles;
+      owners.add(w, out[w].any);
     }
+    owners.add_to(marched_, y, z, layer_.crossed);
   }
 
   void find_candidates(std::uint32_t kind, std::uint32_t y, std::uint32_t z) {
@@ -322,7 +329,10 @@ class ClusterWalk {
         if (risks != 0) {
           kept = without_clashes(sample, all, risks);
           if ((kept & ~Joined::kFlags) == 0) continue;
-          if (kept != all) facts = links.facts(parity(sample), kept & ~Joined::kFlags);
+          if (kept != all) {
+            kept &= ~Joined::kWhole;
+            facts = links.facts(parity(sample), kept & ~Joined::kFlags);
+          }
         }
         if (facts.components() > 1) kept |= Joined::kSeveral;
         joining.samples |= Word{1} << bit;

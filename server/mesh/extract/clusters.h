@@ -12,15 +12,18 @@ namespace isomesh::mesh {
 struct Joined {
   static constexpr std::uint32_t kSeveral = std::uint32_t{1} << 31;
   static constexpr std::uint32_t kJunction = std::uint32_t{1} << 30;
-  static constexpr std::uint32_t kFlags = kSeveral | kJunction;
+  static constexpr std::uint32_t kWhole = std::uint32_t{1} << 29;
+  static constexpr std::uint32_t kFlags = kSeveral | kJunction | kWhole;
 
-  // kSeveral if the directions are more than one component, and kJunction if points where more than
-  // two labels meet are joined with the crossings.
+  // kSeveral if the directions are more than one component, kJunction if points where more than two
+  // labels meet are joined with the crossings, and kWhole if a sample with one other label around
+  // it joins all crossings that it owns.
   std::uint32_t bits = 0;
 
   std::uint32_t directions() const { return bits & ~kFlags; }
   bool is_one() const { return (bits & kSeveral) == 0; }
   bool is_junction() const { return (bits & kJunction) != 0; }
+  bool is_whole() const { return (bits & kWhole) != 0; }
 };
 
 // Those of 64 samples of a row that join crossings.

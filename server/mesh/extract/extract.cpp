@@ -33,9 +33,7 @@ std::optional<T> smallest_inside(double iso) {
   }
 }
 
-std::size_t places_of(const ExtractOptions& options) {
-  return options.scheme == Scheme::kBcc ? kBccPlaces : kEdgePlaces;
-}
+std::size_t places_of(Scheme scheme) { return scheme == Scheme::kBcc ? kBccPlaces : kEdgePlaces; }
 
 }  // namespace
 
@@ -60,6 +58,7 @@ void make_room(const SurfaceCount& count, const LatticeToSpace& to_space, bool c
                                           " cannot be indexed with 32 bits");
   }
   mesh.origin = to_space.origin;
+  mesh.reach = {};
   mesh.layer_vertices = count.layer_vertices;
   mesh.layer_triangles = count.layer_triangles;
   mesh.positions.resize_for_overwrite(count.vertices());
@@ -68,6 +67,27 @@ void make_room(const SurfaceCount& count, const LatticeToSpace& to_space, bool c
   mesh.on_border.assign(close ? (count.vertices() + kFlagBits - 1) / kFlagBits : 0, 0);
   mesh.on_line.clear();
   mesh.normals.clear();
+}
+
+Reach reach_of(std::span<const CrossedRows> layers, const LatticeToSpace& to_space) {
+  CrossedRows all;
+  for (const CrossedRows& layer : layers) all.add(layer);
+  if (all.is_empty()) return {};
+  // An edge between two centres ends one and a half steps beyond its sample.
+  constexpr double kBefore = -1;
+  constexpr double kBehind = 2.5;
+  Reach reach;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double low = all.low[axis];
+    double high = all.high[axis];
+    for (const std::array<double, 3>& step : {to_space.step_x, to_space.step_y, to_space.step_z}) {
+      low += std::min(step[axis] * kBefore, step[axis] * kBehind);
+      high += std::max(step[axis] * kBefore, step[axis] * kBehind);
+    }
+    reach.low[axis] = static_cast<float>(low);
+    reach.high[axis] = static_cast<float>(high);
+  }
+  return reach;
 }
 
 SurfaceSize size_of(const SurfaceCount& count) {
@@ -109,14 +129,15 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
 
   Extraction extraction(lattice, options, *smallest);
   if (options.regularize) extraction.keep(count.clusters);
-  write_pass(extraction, places_of(options), context, mesh, mesh);
+  mesh.reach = reach_of(count.crossed, lattice.to_space);
+  write_pass(extraction, places_of(options.scheme), context, mesh, mesh);
 }
 
 template <class T>
 SurfaceWindows::SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& options,
                                const Context& context, Spool* spool)
     : close_(options.close),
-      origin_(lattice.to_space.origin),
+      to_space_(lattice.to_space),
       count_(empty_count(marched_dims(lattice.dims, options.close).z)),
       joined_(std::make_unique<JoinedLayers>(count_.clusters, spool)) {
   const auto smallest = smallest_inside<T>(options.iso);
@@ -125,17 +146,17 @@ SurfaceWindows::SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& 
   extraction_ = std::make_unique<Extraction>(lattice, options, *smallest);
   if (options.regularize) count_.clusters.resize(extraction_->dims.z);
   joined_->prepare();
-  count_pass(*extraction_, context, count_,
-             [&](const Slab& slab) { joined_->put_aside(slab.begin, slab.end); });
+  count_pass(*extraction_, context, count_, [&](std::uint32_t z) { joined_->put_aside(z); });
   prefix_pass(count_);
   if (options.regularize) extraction_->keep(count_.clusters);
-  memory_ = std::make_unique<IndexMemory>(index_memory_size(extraction_->dims, places_of(options)));
+  memory_ = std::make_unique<IndexMemory>(
+      index_memory_size(extraction_->dims, places_of(options.scheme)));
 }
 
 SurfaceWindows::~SurfaceWindows() = default;
 
 void SurfaceWindows::write(std::uint32_t begin, std::uint32_t end, Mesh& mesh) {
-  mesh.origin = origin_;
+  mesh.origin = to_space_.origin;
   const auto offsets = [&](const std::vector<std::uint64_t>& sums, std::uint32_t behind,
                            std::vector<std::uint64_t>& out) {
     out.clear();
@@ -151,6 +172,14 @@ void SurfaceWindows::write(std::uint32_t begin, std::uint32_t end, Mesh& mesh) {
   if (!extraction_) return;
   joined_->take_back(begin, end + kJoinedLayersBehind);
   write_slab(*extraction_, {begin, end, begin}, *memory_, mesh);
+}
+
+void SurfaceWindows::write_whole(const Context& context, Mesh& mesh) {
+  make_room(count_, to_space_, close_, mesh);
+  if (!extraction_) return;
+  mesh.reach = reach();
+  joined_->take_back(0, layers());
+  write_pass(*extraction_, places_of(extraction_->scheme), context, mesh, mesh);
 }
 
 void SurfaceWindows::forget(std::uint32_t begin, std::uint32_t end) { joined_->forget(begin, end); }

@@ -34,6 +34,7 @@
 
 #include "server/mesh/context.h"
 #include "server/mesh/extract/clusters.h"
+#include "server/mesh/extract/crossed_rows.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/lattice/placement.h"
 #include "server/mesh/mesh.h"
@@ -46,6 +47,7 @@ struct SurfaceCount {
   std::vector<std::uint64_t> layer_vertices = {0};
   std::vector<std::uint64_t> layer_triangles = {0};
   std::vector<ClusterLayer> clusters;  // of each layer; empty of a surface that is not regularised
+  std::vector<CrossedRows> crossed = {};  // of each layer
 
   std::uint64_t vertices() const { return layer_vertices.back(); }
   std::uint64_t triangles() const { return layer_triangles.back(); }

@@ -19,25 +19,23 @@ void visit_arrays(ClusterLayer& layer, Visit visit) {
 
 }  // namespace
 
-void JoinedLayers::put_aside(std::uint32_t begin, std::uint32_t end) {
+void JoinedLayers::put_aside(std::uint32_t z) {
   if (spool_ == nullptr || layers_.empty()) return;
-  for (std::uint32_t z = begin; z < end; ++z) {
-    Place& place = places_[z];
-    std::uint64_t bytes = 0;
-    visit_arrays(layers_[z], [&](std::size_t number, auto& array) {
-      place.sizes[number] = array.size();
-      bytes += std::span(array).size_bytes();
-    });
-    place.begin = end_.fetch_add(bytes);
-    place.is_aside = bytes > 0;
-    std::uint64_t at = place.begin;
-    visit_arrays(layers_[z], [&](std::size_t /*number*/, auto& array) {
-      const auto written = std::as_bytes(std::span(array));
-      if (!written.empty()) spool_->write(at, written);
-      at += written.size();
-      array = std::remove_cvref_t<decltype(array)>();  // unlike {}, frees the memory
-    });
-  }
+  Place& place = places_[z];
+  std::uint64_t bytes = 0;
+  visit_arrays(layers_[z], [&](std::size_t number, auto& array) {
+    place.sizes[number] = array.size();
+    bytes += std::span(array).size_bytes();
+  });
+  place.begin = spool_->take(bytes);
+  place.is_aside = bytes > 0;
+  std::uint64_t at = place.begin;
+  visit_arrays(layers_[z], [&](std::size_t /*number*/, auto& array) {
+    const auto written = std::as_bytes(std::span(array));
+    if (!written.empty()) spool_->write(at, written);
+    at += written.size();
+    array = std::remove_cvref_t<decltype(array)>();  // unlike {}, frees the memory
+  });
 }
 
 void JoinedLayers::take_back(std::uint32_t begin, std::uint32_t end) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,7 +24,7 @@ class JoinedLayers {
   // When there are as many layers as there will be.
   void prepare() { places_.resize(spool_ == nullptr ? 0 : layers_.size()); }
   // For one thread for each layer. The sums of the layer stay in memory.
-  void put_aside(std::uint32_t begin, std::uint32_t end);
+  void put_aside(std::uint32_t z);
   void take_back(std::uint32_t begin, std::uint32_t end);
   void forget(std::uint32_t begin, std::uint32_t end);
 
@@ -38,7 +37,6 @@ class JoinedLayers {
 
   std::vector<ClusterLayer>& layers_;
   Spool* const spool_;
-  std::atomic<std::uint64_t> end_ = 0;
   Mutex mutex_;  // while layers are taken back
   std::vector<Place> places_;
 };

@@ -223,7 +223,6 @@ class SignField {
   static constexpr std::size_t kPlaces = kEdgePlaces;
   static constexpr bool kHasLines = false;
   static constexpr bool kHasClusters = false;
-  static constexpr bool kPlacesVertices = true;
   // For regular-inl.h: the kinds of points that have clusters, the places of edges that clusters
   // may have, and the places for the directions of a point.
   static constexpr std::size_t kKinds = 1;

@@ -34,23 +34,18 @@ inline SurfaceCount empty_count(std::uint32_t layers) {
   SurfaceCount count;
   count.layer_vertices.assign(std::size_t{layers} + 1, 0);
   count.layer_triangles.assign(std::size_t{layers} + 1, 0);
+  count.crossed.assign(layers, {});
   return count;
 }
 
-// Pass 1: how many vertices and triangles each layer has, in the place behind the layer's. Calls
-// ended(slab) after each slab, on several threads.
-template <class Marched, class Ended>
-void count_pass(const Marched& marched, const Context& context, SurfaceCount& count, Ended ended) {
+// Pass 1: how many vertices and triangles each layer has, in the place behind the layer's. `ended`:
+// see count_slab.
+template <class Marched, class... Ended>
+void count_pass(const Marched& marched, const Context& context, SurfaceCount& count,
+                const Ended&... ended) {
   const auto slabs = cut_slabs(marched.dims.z, [](std::uint32_t z) { return z; });
-  parallel_for(context, slabs.size(), [&](std::size_t task) {
-    count_slab(marched, slabs[task], count);
-    ended(slabs[task]);
-  });
-}
-
-template <class Marched>
-void count_pass(const Marched& marched, const Context& context, SurfaceCount& count) {
-  count_pass(marched, context, count, [](const Slab& /*slab*/) {});
+  parallel_for(context, slabs.size(),
+               [&](std::size_t task) { count_slab(marched, slabs[task], count, ended...); });
 }
 
 // Pass 2: where each layer begins.

@@ -19,6 +19,7 @@
 
 #include <hwy/highway.h>
 
+#include "server/mesh/extract/crossed_rows.h"
 #include "server/mesh/extract/slabs.h"
 #include "server/mesh/lattice/rows-inl.h"
 
@@ -128,9 +129,7 @@ class SlabWriter {
     for (std::size_t i = 0; i < vertices_found_; ++i) {
       indices[vertices_[i]] = vertex + static_cast<std::uint32_t>(i);
     }
-    if constexpr (Field::kPlacesVertices) {
-      if (z < slab_.end) place_vertices(y, z, vertex);
-    }
+    if (z < slab_.end) place_vertices(y, z, vertex);
     vertex += static_cast<std::uint32_t>(vertices_found_);
   }
 
@@ -153,7 +152,10 @@ class SlabWriter {
 
   // Places the vertices of the row, the first of which is `vertex`.
   void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
-    if constexpr (Field::kHasLines) mark_lines(vertex);
+    if constexpr (Field::kHasLines) {
+      mark_lines(vertex);
+      field_.tell_owners(y, z, std::span(vertices_).first(vertices_found_), vertex, output_);
+    }
     if (marched_.margin == 0) return place_inner(0, vertices_found_, y, z, vertex);
     std::size_t begin = 0;
     std::size_t end = vertices_found_;
@@ -259,18 +261,28 @@ template <class Field>
 void count_slab_of(const typename Field::Marched& marched, const Slab& slab, SurfaceCount& count) {
   Field field(marched, slab.begin);
   const std::size_t words = words_of(marched.dims.x);
+  typename Field::Cells cells;
   for (std::uint32_t z = slab.begin; z < slab.end; ++z) {
     field.reach(z);
     std::uint64_t vertices = 0;
     std::uint64_t triangles = 0;
     for (std::uint32_t y = 0; y < marched.dims.y; ++y) {
       const auto row = field.row(y, z);
+      std::size_t first = words;
+      std::size_t last = 0;
       for (std::size_t w = 0; w < words; ++w) {
         if (!row.may_cross(w)) continue;
         const WordCount found = row.count(w);
         vertices += found.vertices;
         triangles += found.triangles;
+        if (found.vertices == 0) continue;
+        first = std::min(first, w);
+        last = w;
       }
+      if (first == words) continue;
+      OwnersOfRow owners;
+      for (const std::size_t w : {first, last}) owners.add(w, row.describe(w, cells));
+      owners.add_to(marched, y, z, count.crossed[z]);
     }
     count.layer_vertices[z + 1] = vertices;
     count.layer_triangles[z + 1] = triangles;

@@ -19,11 +19,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
+void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count,
+                 const LayerEnded& ended) {
   const bool is_bcc = extraction.scheme == Scheme::kBcc;
   if (extraction.regularize) {
-    return is_bcc ? ClusterWalk<BccClusters>(extraction, slab, count).count()
-                  : ClusterWalk<SignClusters>(extraction, slab, count).count();
+    return is_bcc ? ClusterWalk<BccClusters>(extraction, slab, count).count(ended)
+                  : ClusterWalk<SignClusters>(extraction, slab, count).count(ended);
   }
   is_bcc ? count_slab_of<BccField>(extraction, slab, count)
          : count_slab_of<SignField>(extraction, slab, count);
@@ -48,8 +49,9 @@ namespace isomesh::mesh {
 HWY_EXPORT(count_signs);
 HWY_EXPORT(write_signs);
 
-void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
-  HWY_DYNAMIC_DISPATCH(count_signs)(extraction, slab, count);
+void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count,
+                const LayerEnded& ended) {
+  HWY_DYNAMIC_DISPATCH(count_signs)(extraction, slab, count, ended);
 }
 
 void write_slab(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -122,8 +123,10 @@ inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {
 }
 
 // Pass 1, count: how many vertices and triangles layer k has goes to layer_vertices[k + 1] and
-// layer_triangles[k + 1].
-void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count);
+// layer_triangles[k + 1]. Calls ended(k) when clusters[k] is complete.
+using LayerEnded = std::function<void(std::uint32_t)>;
+void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count,
+                const LayerEnded& ended = {});
 
 // Pass 3, write: the slab's vertices and triangles go to their places, which mesh.layer_vertices
 // and mesh.layer_triangles tell. Reads joined crossings of the planes [begin, end + 2), and of the

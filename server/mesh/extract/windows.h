@@ -33,17 +33,22 @@ class SurfaceWindows {
     return static_cast<std::uint32_t>(count_.layer_vertices.size() - 1);
   }
 
+  // Mesh::reach of the whole.
+  Reach reach() const { return reach_of(count_.crossed, to_space_); }
+
   // Writes the layers [begin, end) of the surface as a mesh, whose memory is reused. It has one
   // layer more, without triangles: room for the vertices of the layer behind them, which triangles
   // name; those are left indeterminate. Vertices have the mesh's own numbers. Thread safe for
   // different meshes. Throws as the spool.
   void write(std::uint32_t begin, std::uint32_t end, Mesh& mesh);
+  // Writes all of it, as extract_surface does. Once, and not after `forget`.
+  void write_whole(const Context& context, Mesh& mesh);
   // Frees what layers need that are not written again. Not while others near them are written.
   void forget(std::uint32_t begin, std::uint32_t end);
 
  private:
   const bool close_;
-  const std::array<double, 3> origin_;
+  const LatticeToSpace to_space_;
   SurfaceCount count_;
   std::unique_ptr<JoinedLayers> joined_;
   std::unique_ptr<Extraction> extraction_;  // null if there is no surface

@@ -80,7 +80,10 @@ class LabelClusters {
   template <class Crossed>
   Directions candidates(const GridSample& at, Directions own, Crossed crossed) {
     look_around(at);
-    if (!is_junction(crossed())) return components_to_join(links_, parity(at), own, crossed);
+    if (!is_junction(crossed())) {
+      const Directions joined = components_to_join(links_, parity(at), own, crossed);
+      return joined == own ? joined | Joined::kWhole : joined;
+    }
     const bool joins = !separation_.parts.overlap() && joins_all(at, own, crossed());
     return joins ? own | Joined::kJunction : 0;
   }

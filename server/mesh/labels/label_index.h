@@ -42,6 +42,15 @@ class LabelIndex {
     }
   }
 
+  PartNumber number_of(T value) const {
+    if constexpr (kHasTable) {
+      return table_[static_cast<Bits>(value)];
+    } else {
+      const auto found = std::ranges::lower_bound(entries_, value, {}, &Entry::value);
+      return found != entries_.end() && found->value == value ? found->number : PartNumber{0};
+    }
+  }
+
   // Writes the part numbers of `count` samples to `out`.
   void translate(const T* samples, std::size_t count, PartNumber* out) const {
     for (std::size_t begin = 0; begin < count; begin += kRun) {
@@ -75,15 +84,6 @@ class LabelIndex {
     }
   }
 
-  PartNumber number_of(T value) const {
-    if constexpr (kHasTable) {
-      return table_[static_cast<Bits>(value)];
-    } else {
-      const auto found = std::ranges::lower_bound(entries_, value, {}, &Entry::value);
-      return found != entries_.end() && found->value == value ? found->number : PartNumber{0};
-    }
-  }
-
   std::vector<PartNumber> table_;  // by the bits of the value
   std::vector<Entry> entries_;     // where there are too many values for a table, ascending
 };
@@ -95,6 +95,8 @@ class SampleParts {
   virtual ~SampleParts() = default;
 
   virtual const Dims& dims() const = 0;
+  // That of one sample; x is fastest.
+  virtual PartNumber part(std::uint64_t sample) const = 0;
   // Writes the numbers of a row's samples to `out`, which has room for dims().x of them.
   virtual void copy_row(std::uint32_t y, std::uint32_t z, PartNumber* out) const = 0;
 };
@@ -106,6 +108,10 @@ class PartsOf final : public SampleParts {
   PartsOf(const Lattice<T>& lattice, const LabelParts& parts) : lattice_(lattice), index_(parts) {}
 
   const Dims& dims() const override { return lattice_.dims; }
+
+  PartNumber part(std::uint64_t sample) const override {
+    return index_.number_of(lattice_.samples[sample]);
+  }
 
   void copy_row(std::uint32_t y, std::uint32_t z, PartNumber* out) const override {
     const Dims& dims = lattice_.dims;

@@ -12,8 +12,6 @@
 #include "server/mesh/labels/label_clusters-inl.h"
 #include "server/mesh/labels/labels-inl.h"
 #include "server/mesh/labels/regular_labels-inl.h"
-#include "server/mesh/labels/volume_tally-inl.h"
-#include "server/mesh/labels/volume_tally.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
@@ -66,14 +64,6 @@ void write_labels(const Separation& separation, const Slab& slab, IndexMemory& m
   write_slab_of<LabelField>(separation, slab, memory, surface);
 }
 
-void tally_volume(const Separation& separation, const Slab& slab, IndexMemory& memory,
-                  VolumeTally& tally) {
-  if (separation.regularize) {
-    return write_slab_of<TallyField<RegularLabelField>>(separation, slab, memory, tally);
-  }
-  write_slab_of<TallyField<LabelField>>(separation, slab, memory, tally);
-}
-
 }  // namespace isomesh::mesh::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -83,7 +73,6 @@ namespace isomesh::mesh {
 HWY_EXPORT(count_labels);
 HWY_EXPORT(tally_labels);
 HWY_EXPORT(write_labels);
-HWY_EXPORT(tally_volume);
 
 void count_slab(const Separation& separation, const Slab& slab, SurfaceCount& count) {
   HWY_DYNAMIC_DISPATCH(count_labels)(separation, slab, count);
@@ -97,11 +86,6 @@ void tally_slab(const Separation& separation, const Slab& slab,
 void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,
                 SeparatingSurface& surface) {
   HWY_DYNAMIC_DISPATCH(write_labels)(separation, slab, memory, surface);
-}
-
-void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,
-                VolumeTally& tally) {
-  HWY_DYNAMIC_DISPATCH(tally_volume)(separation, slab, memory, tally);
 }
 
 }  // namespace isomesh::mesh

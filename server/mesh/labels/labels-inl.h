@@ -18,6 +18,7 @@
 
 #include <hwy/highway.h>
 
+#include "server/mesh/extract/links.h"
 #include "server/mesh/labels/label_planes-inl.h"
 #include "server/mesh/labels/label_slabs.h"
 #include "server/mesh/lattice/rows-inl.h"
@@ -306,13 +307,25 @@ class LabelField {
   static constexpr std::size_t kPlaces = kSlotPlaces;
   static constexpr bool kHasLines = true;
   static constexpr bool kHasClusters = false;
-  static constexpr bool kPlacesVertices = true;
 
   LabelField(const Separation& separation, std::uint32_t first)
       : separation_(separation),
         dims_(separation.dims),
         planes_{LabelPlane(dims_), LabelPlane(dims_), LabelPlane(dims_)},
-        next_(first) {}
+        next_(first) {
+    const std::span<const LinkDirection> directions = links_of(separation.scheme).directions();
+    for (unsigned parity = 0; parity < 2; ++parity) {
+      for (std::size_t place = 0; place < kEdgePlaces; ++place) {
+        const auto& ends = separation.walls[parity].slots[place].corners;
+        for (std::size_t end = 0; end < 2; ++end) {
+          const auto step = cell_step(ends[end], ends[1 - end]);
+          const auto found = std::ranges::find(directions, step, &LinkDirection::step);
+          if (found == directions.end()) continue;  // no edge in that place
+          ways_[parity][place][end] = Directions{1} << (found - directions.begin());
+        }
+      }
+    }
+  }
 
   // Looks up the labels up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
@@ -398,13 +411,61 @@ class LabelField {
     return vertex;
   }
 
+  // Tells the owners of vertices that samples of a row name, in the places `vertices`. `first` is
+  // the first one's number.
+  void tell_owners(std::uint32_t y, std::uint32_t z, std::span<const std::uint32_t> vertices,
+                   std::uint32_t first, SeparatingSurface& surface) const {
+    const std::uint32_t behind = std::min(y + 1, dims_.y - 1);
+    const std::uint32_t above = std::min(z + 1, dims_.z - 1);
+    const std::array rows = {labels(y, z), labels(behind, z), labels(y, above),
+                             labels(behind, above)};
+    const unsigned row_parity = separation_.parity(0, y, z);
+    VertexOwner* out = surface.owners.data() + first;
+    for (const std::uint32_t vertex : vertices) {
+      const std::uint32_t x = vertex / kPlaces;
+      const std::size_t place = vertex % kPlaces;
+      const unsigned parity = (x + row_parity) & 1;
+      const Slot& slot = separation_.walls[parity].slots[place];
+      std::size_t owner = 0;
+      PartNumber most = 0;
+      for (std::size_t i = 0; i < slot.size; ++i) {
+        const unsigned corner = slot.corners[i];
+        const PartNumber label = rows[corner >> 1][x + (corner & 1)];
+        if (label <= most) continue;
+        most = label;
+        owner = i;
+      }
+      const unsigned corner = slot.corners[owner];
+      *out = {};
+      out->sample = sample_at(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2));
+      if (place < kEdgePlaces) out->directions = ways_[parity][place][owner];
+      ++out;
+    }
+  }
+
   LabelCellWriter<false> cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
                                      SeparatingSurface& surface) const {
     return {separation_, row(y, z), offsets, z, surface};
   }
 
+ protected:
+  // In the lattice's own numbers, where phantoms are numbered too.
+  std::uint64_t sample_at(std::uint32_t x, std::uint32_t y, std::uint32_t z) const {
+    const Dims& inner = separation_.samples->dims();
+    const std::uint32_t margin = separation_.margin;
+    return (std::uint64_t{z - margin} * inner.y + (y - margin)) * inner.x + (x - margin);
+  }
+
  private:
   static constexpr std::uint32_t kPlanes = 3;
+
+  static std::array<int, 3> cell_step(unsigned from, unsigned to) {
+    std::array<int, 3> step;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      step[axis] = static_cast<int>(to >> axis & 1) - static_cast<int>(from >> axis & 1);
+    }
+    return step;
+  }
 
   std::uint32_t samples_along(std::size_t axis) const {
     return std::array{dims_.x, dims_.y, dims_.z}[axis];
@@ -421,6 +482,8 @@ class LabelField {
   const Separation& separation_;
   const Dims dims_;
   std::array<LabelPlane, kPlanes> planes_;
+  // By parity and place of an edge: its direction from its first end, and from its second.
+  std::array<std::array<std::array<Directions, 2>, kEdgePlaces>, 2> ways_ = {};
   std::uint32_t next_;
 };
 

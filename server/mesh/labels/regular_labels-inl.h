@@ -101,6 +101,11 @@ class RegularLabelField : public LabelField {
             if (surface != nullptr) {
               const bool is_on_line = points != nullptr && (points->faces | points->centres) != 0;
               place(at + mean(parity, component, points), is_on_line, vertex, surface->mesh);
+              VertexOwner& owner = surface->owners[vertex];
+              owner = {};
+              owner.sample = sample_at(x, y, z);
+              owner.directions = component;
+              owner.is_whole = all.is_whole() ? 1 : 0;
             }
             ++vertex;
           }

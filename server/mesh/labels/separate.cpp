@@ -67,6 +67,7 @@ void extract_walls(const Lattice<T>& lattice, const SeparateOptions& options,
   make_room(count, lattice.to_space, options.close, mesh);
   mesh.on_line.assign((count.vertices() + kFlagBits - 1) / kFlagBits, 0);
   surface.sides.resize_for_overwrite(count.triangles());
+  surface.owners.resize_for_overwrite(count.vertices());
   surface.labels = options.labels;
   surface.parts = LabelParts(options.labels, options.values);
   if (count.vertices() == 0) return context.throw_if_stopped();

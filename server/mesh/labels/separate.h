@@ -53,6 +53,17 @@ struct WallSides {
   bool operator==(const WallSides&) const = default;
 };
 
+// The sample that a vertex was made for: of those around it that with the largest number of a part,
+// which owns the crossings to all others (label_clusters-inl.h).
+struct VertexOwner {
+  std::uint64_t sample : 45 = 0;  // of the lattice, x fastest
+  // To the neighbours (links.h) that the vertex is the crossing to. None of a vertex that is only
+  // the point of a face or of a tetrahedron.
+  std::uint64_t directions : 18 = 0;
+  // The sample has one other label around it, and no crossing that is another vertex.
+  std::uint64_t is_whole : 1 = 0;
+};
+
 // The walls between all labels. `mesh` has the layers that mesh.h tells of; it is no manifold where
 // three labels meet: mesh.on_line are the vertices in faces and centres, and those that such
 // vertices were joined in. An edge between two of them lies on a curve if three triangles have it;
@@ -62,6 +73,7 @@ struct WallSides {
 struct SeparatingSurface {
   Mesh mesh;
   Buffer<WallSides> sides;           // of each triangle
+  Buffer<VertexOwner> owners;        // of each vertex, until any is moved to another place
   std::vector<std::int64_t> labels;  // ascending
   LabelParts parts;                  // whose sides these are
 };

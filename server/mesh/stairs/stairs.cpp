@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/mesh/labels/label_index.h"
-#include "server/mesh/labels/missing_volume.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
 #include "server/mesh/stairs/filter.h"
+#include "server/mesh/stairs/missing_volume.h"
 #include "server/mesh/stairs/mobility.h"
 #include "server/mesh/stairs/unfold.h"
 #include "server/mesh/stairs/volume_keeper.h"
@@ -35,13 +36,13 @@ constexpr double kMostRatio = 5;
 
 class Remover {
  public:
-  Remover(const std::vector<float>& missing, const Context& context, WallShape& shape)
+  Remover(Buffer<float> missing, const Context& context, WallShape& shape)
       : shape_(shape),
         context_{context.stop, nullptr},
         mobility_(find_mobility(shape, context_)),
         ratio_(std::min(kMostRatio, double{shape.largest_spacing()} / shape.smallest_spacing())),
         spread_(series(kSpreadDegree, kSpreadTime)),
-        keeper_(shape, mobility_, missing, spread_, context_) {}
+        keeper_(shape, mobility_, std::move(missing), spread_, context_) {}
 
   void run() {
     const std::vector<float> light = series(kSmoothDegree, kSmoothTime);
@@ -143,20 +144,12 @@ Displacements take_over(const WallShape& shape, const LatticeToSpace& to_space, 
   return all;
 }
 
-std::vector<float> volumes_in(const WallShape& shape, const Buffer<float>& voxels) {
-  const Lanes spacing = shape.spacing();
-  const float voxel = std::abs(spacing[0] * spacing[1] * spacing[2]);
-  std::vector<float> volumes(voxels.begin(), voxels.end());
-  for (float& volume : volumes) volume *= voxel;
-  return volumes;
-}
-
 }  // namespace
 
 template <class T>
 SmoothingEffect remove_stairs(const Lattice<T>& lattice, const SeparateOptions& options,
-                              const SurfaceCount& count, double max_displacement_mm,
-                              const Context& context, SeparatingSurface& surface) {
+                              double max_displacement_mm, const Context& context,
+                              SeparatingSurface& surface) {
   const Context quiet = {context.stop, nullptr};
   const auto report = [&](double share) {
     if (context.progress) context.progress(share);
@@ -166,10 +159,9 @@ SmoothingEffect remove_stairs(const Lattice<T>& lattice, const SeparateOptions& 
   if (surface.mesh.positions.size() == 0) return effect;
   WallShape shape(surface, lattice.dims, lattice.to_space, options.close, quiet);
   report(0.2);
-  const std::vector<float> missing =
-      volumes_in(shape, missing_volume(lattice, options, count, shape.fans(), quiet, surface));
+  Buffer<float> missing = missing_volume(lattice, options.scheme, surface, shape, quiet);
   report(0.3);
-  Remover(missing, quiet, shape).run();
+  Remover(std::move(missing), quiet, shape).run();
   report(0.9);
   const Displacements moved =
       take_over(shape, lattice.to_space, max_displacement_mm, quiet, surface.mesh);
@@ -188,10 +180,9 @@ std::uint64_t stairs_memory(const SurfaceSize& size) {
          size.vertices * (kBytesPerVertex + kBytesPerFan * 3 / 2);
 }
 
-#define ISOMESH_INSTANTIATE(T)                                                        \
-  template SmoothingEffect remove_stairs(const Lattice<T>&, const SeparateOptions&,   \
-                                         const SurfaceCount&, double, const Context&, \
-                                         SeparatingSurface&);
+#define ISOMESH_INSTANTIATE(T)                                                              \
+  template SmoothingEffect remove_stairs(const Lattice<T>&, const SeparateOptions&, double, \
+                                         const Context&, SeparatingSurface&);
 ISOMESH_FOR_EACH_LABEL_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -26,16 +26,16 @@
 
 namespace isomesh::mesh {
 
-// Moves the vertices of walls that extract_walls has just made with that lattice, options and
-// count; meant for options.regularize, whose vertices are spread evenly. None is moved farther than
+// Moves the vertices of walls that extract_walls has just made with that lattice and options;
+// meant for options.regularize, whose vertices are spread evenly. None is moved farther than
 // `max_displacement_mm`. Caps stay flat, the ends of walls in the border of the volume stay in it,
 // and the rest of walls stays within it. The result does not depend on the number of threads. For
 // the six integer types of SampleType. Throws Error kCancelled; the positions are indeterminate
 // then.
 template <class T>
 SmoothingEffect remove_stairs(const Lattice<T>& lattice, const SeparateOptions& options,
-                              const SurfaceCount& count, double max_displacement_mm,
-                              const Context& context, SeparatingSurface& surface);
+                              double max_displacement_mm, const Context& context,
+                              SeparatingSurface& surface);
 
 // An upper estimate of what remove_stairs takes beside the surface, in bytes.
 std::uint64_t stairs_memory(const SurfaceSize& size);

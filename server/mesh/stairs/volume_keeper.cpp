@@ -1,6 +1,7 @@
 #include "server/mesh/stairs/volume_keeper.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -32,10 +33,9 @@ struct FanSums {
 
 }  // namespace
 
-VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility,
-                           const std::vector<float>& missing, const std::vector<float>& series,
-                           const Context& context)
-    : shape_(shape), mobility_(mobility), missing_(missing), series_(series), context_(context) {
+VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility, Buffer<float> missing,
+                           const std::vector<float>& series, const Context& context)
+    : shape_(shape), mobility_(mobility), series_(series), context_(context) {
   const WallFans& fans = shape.fans();
   for (Buffer<float>* const each : {&kept_, &shares_, &areas_}) {
     each->resize_for_overwrite(fans.size());
@@ -57,6 +57,9 @@ VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility,
     shares_[fan] = mobility.spread[v] / std::max(1.0F, count);
   });
   find_areas();
+  // Half-way to the mean, twice: the owner of a vertex has all that its neighbours have a part in.
+  constexpr std::array<float, 3> kHalfWays = {0.375F, 0.5F, 0.125F};
+  missing_ = diffused(std::move(missing), kHalfWays, Way::kSpread);
 }
 
 void VolumeKeeper::hold_curves() {
@@ -74,7 +77,7 @@ void VolumeKeeper::find_areas() {
     const std::size_t v = shape_.fans().vertex(fan);
     room[fan] = may_move(v) ? areas_[fan] * mobility_.owes[v] : 0;
   });
-  room_ = diffused(std::move(room), Way::kSpread);
+  room_ = diffused(std::move(room), series_, Way::kSpread);
 }
 
 Buffer<float> VolumeKeeper::all_fans() const {
@@ -83,13 +86,14 @@ Buffer<float> VolumeKeeper::all_fans() const {
   return values;
 }
 
-Buffer<float> VolumeKeeper::diffused(Buffer<float> values, Way way) const {
+Buffer<float> VolumeKeeper::diffused(Buffer<float> values, std::span<const float> series,
+                                     Way way) const {
   const Rings& neighbors = shape_.fans().neighbors();
   Buffer<float> before = all_fans();  // T[j - 2], then T[j]; values is T[j - 1]
   Buffer<float> sum = all_fans();
   Buffer<float> given;
   if (way == Way::kSpread) given = all_fans();
-  for (std::size_t j = 1; j < series_.size(); ++j) {
+  for (std::size_t j = 1; j < series.size(); ++j) {
     if (way == Way::kSpread) {
       for_each(context_, values.size(),
                [&](std::size_t fan) { given[fan] = values[fan] * shares_[fan]; });
@@ -100,7 +104,7 @@ Buffer<float> VolumeKeeper::diffused(Buffer<float> values, Way way) const {
       if (way == Way::kAverage) mean *= shares_[fan];
       const float step = mean + kept_[fan] * values[fan];
       before[fan] = j == 1 ? step : 2 * step - before[fan];
-      sum[fan] = (j == 1 ? series_[0] * values[fan] : sum[fan]) + series_[j] * before[fan];
+      sum[fan] = (j == 1 ? series[0] * values[fan] : sum[fan]) + series[j] * before[fan];
     });
     std::swap(before, values);
   }
@@ -132,7 +136,7 @@ Buffer<float> VolumeKeeper::offsets(const WallShape& shape, Buffer<Lanes>& norma
     const float room = std::max(grown * room_[fan], kLeastRoom * areas[fan]);
     offsets[fan] = room > 0 ? missing / room : 0;
   });
-  offsets = diffused(std::move(offsets), Way::kAverage);
+  offsets = diffused(std::move(offsets), series_, Way::kAverage);
   for_each(context_, fans.size(), [&](std::size_t fan) {
     const float size = length(normals[fan]);
     if (size <= 0 || areas[fan] <= 0) {

@@ -1,6 +1,7 @@
 // Puts the volume back that walls lack; private to this folder.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "server/mesh/stairs/mobility.h"
@@ -14,8 +15,8 @@ namespace isomesh::mesh {
 class VolumeKeeper {
  public:
   // `missing`: by fan, what the wall's back lacks at the start, in the shape's unit. `series`: how
-  // far it is spread. All have to outlive this.
-  VolumeKeeper(const WallShape& shape, const Mobility& mobility, const std::vector<float>& missing,
+  // far it is spread. `shape`, `mobility`, `series` and `context` have to outlive this.
+  VolumeKeeper(const WallShape& shape, const Mobility& mobility, Buffer<float> missing,
                const std::vector<float>& series, const Context& context);
 
   // From now on curves stay.
@@ -30,19 +31,19 @@ class VolumeKeeper {
   Buffer<float> all_fans() const;  // of indeterminate values
   void find_areas();
   bool may_move(std::size_t vertex) const;
-  Buffer<float> diffused(Buffer<float> values, Way way) const;
+  Buffer<float> diffused(Buffer<float> values, std::span<const float> series, Way way) const;
   Buffer<float> offsets(const WallShape& shape, Buffer<Lanes>& normals) const;
   Lanes way_of_curve(const WallShape& shape, std::size_t vertex, const Buffer<float>& offsets,
                      const Buffer<Lanes>& normals) const;
 
   const WallShape& shape_;
   const Mobility& mobility_;
-  const std::vector<float>& missing_;
   const std::vector<float>& series_;
   const Context& context_;
   bool holds_curves_ = false;
   Buffer<float> kept_;     // by fan: of itself in the mean
   Buffer<float> shares_;   // by fan: of a neighbour in the mean
+  Buffer<float> missing_;  // by fan, at the start, a little spread
   Buffer<float> areas_;    // by fan, at the start
   Buffer<Lanes> normals_;  // the same; the length is twice the area
   Buffer<float> room_;     // those that may take volume, spread

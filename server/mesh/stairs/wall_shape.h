@@ -51,6 +51,7 @@ class WallShape {
   Lanes spacing() const { return spacing_; }
   float largest_spacing() const { return largest_spacing_; }
   float smallest_spacing() const { return smallest_spacing_; }
+  bool is_closed() const { return closed_; }
   // Opposite corners of the box of the outermost samples or, if closed, of the caps.
   Lanes low() const { return low_; }
   Lanes high() const { return high_; }

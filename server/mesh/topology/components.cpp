@@ -212,6 +212,7 @@ Dropped leave_out(const std::vector<bool>& kept, const std::vector<std::uint64_t
     dropped.triangles += triangles[n];
   }
   if (dropped.components == 0) return dropped;
+  mesh.reach = {};
   std::uint64_t next = 0;
   std::uint64_t t = 0;
   const auto is_kept = [&](const Triangle& triangle) {

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "base/mutex.h"
+#include "server/mesh/measure/normals.h"
 #include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
 #include "server/mesh/smooth/flat_triangles.h"
 #include "server/mesh/smooth/layer_steps.h"
 
@@ -31,32 +34,39 @@ std::uint32_t usual_depth(std::uint64_t triangles, std::uint64_t layers) {
       std::clamp<std::uint64_t>(std::min(deep, shared), kFewestLayers, kMostLayers));
 }
 
+std::uint32_t depth_of(const WalkOptions& options, std::uint64_t triangles, std::uint64_t layers) {
+  return options.depth == 0 ? usual_depth(triangles, layers) : options.depth;
+}
+
 // The windows in memory: one that is used, those that hold its layers up, and one for each thread.
-std::size_t windows_at_once(std::size_t steps, std::uint32_t depth) {
-  return 1 + (steps + kLayersUntilSettled + depth - 1) / depth +
-         static_cast<std::size_t>(thread_count());
+std::size_t windows_at_once(const WalkOptions& options, std::uint32_t depth) {
+  const std::size_t layers =
+      options.smooth.steps.size() + kLayersUntilSettled + (options.normals ? 1 : 0);
+  return 1 + (layers + depth - 1) / depth + static_cast<std::size_t>(thread_count());
 }
 
 class Walk {
  public:
-  Walk(SurfaceWindows& surface, const SmoothOptions& options, const Context& context,
+  Walk(SurfaceWindows& surface, const WalkOptions& options, const Context& context,
        WindowUser& user, std::uint32_t depth)
       : surface_(surface),
         context_(context),
         user_(user),
         threads_(static_cast<std::size_t>(thread_count())),
         depth_(depth),
+        has_normals_(options.normals),
         count_((surface.layers() + depth - 1) / depth),
-        slots_(std::min(count_, windows_at_once(options.steps.size(), depth))),
+        slots_(std::min(count_, windows_at_once(options, depth))),
         results_(surface.layers()),
         layers_{[this](std::ptrdiff_t layer) { return view(layer); }, results_},
         flat_(layers_),
         written_(count_, false) {
-    for (const Step& step : options.steps) shares_.push_back(static_cast<float>(step.weight));
+    const SmoothOptions& smooth = options.smooth;
+    for (const Step& step : smooth.steps) shares_.push_back(static_cast<float>(step.weight));
     const Round round = {.shares = shares_,
-                         .at_curves = options.at_curves,
-                         .max_displacement_mm = options.max_displacement_mm,
-                         .within = options.within,
+                         .at_curves = smooth.at_curves,
+                         .max_displacement_mm = smooth.max_displacement_mm,
+                         .within = smooth.within,
                          .largest_layer = size_of(surface.count()).largest_layer,
                          .is_last = !shares_.empty()};
     steps_.emplace(round, LayerRange{0, layers_.count()}, layers_);
@@ -114,6 +124,7 @@ class Walk {
     for (Window& slot : slots_) {
       slot.mesh.positions.resize_for_overwrite(vertices);
       slot.mesh.triangles.resize_for_overwrite(triangles);
+      if (has_normals_) slot.normals.resize_for_overwrite(vertices);
     }
   }
 
@@ -216,13 +227,16 @@ class Walk {
     }
   }
 
-  // Copies the vertices of the next window's first layer to the place behind the window's own.
-  void copy_behind(std::size_t window) {
+  // Copies what the next window has of its first layer's vertices to the place behind the window's.
+  void copy_behind(std::size_t window, const std::function<Vec3*(Window&)>& values) {
     if (window + 1 == count_) return;
-    Mesh& mesh = at(window).mesh;
+    const Mesh& mesh = at(window).mesh;
     const Mesh& next = at(window + 1).mesh;
-    std::copy_n(next.positions.data(), next.layer_vertices[1],
-                mesh.positions.data() + mesh.layer_vertices[mesh.layers() - 1]);
+    std::copy_n(values(at(window + 1)), next.layer_vertices[1],
+                values(at(window)) + mesh.layer_vertices[mesh.layers() - 1]);
+  }
+  void copy_positions_behind(std::size_t window) {
+    copy_behind(window, [](Window& of) { return of.mesh.positions.data(); });
   }
 
   // Shows triangles as they were extracted. The last layer of the window before has not moved yet.
@@ -230,7 +244,7 @@ class Walk {
     Window& own = at(window);
     own.below.clear();
     if (window > 0) {
-      copy_behind(window - 1);
+      copy_positions_behind(window - 1);
       const Mesh& below = at(window - 1).mesh;
       const std::size_t last = below.layers() - 2;
       user_.see_extracted(below, below.layer_triangles[last], below.layer_triangles[last + 1]);
@@ -248,10 +262,44 @@ class Walk {
   void smooth(std::size_t window) {
     steps_->go_on(end_of(window));
     flat_.go_on(steps_->moved());
+    if (has_normals_) shade();
+    const std::ptrdiff_t ended = has_normals_ ? shaded_ : flat_.ended();
     for (; settled_ < count_; ++settled_) {
-      if (flat_.ended() < std::min<std::ptrdiff_t>(layers_.count(), end_of(settled_) + 1)) return;
-      copy_behind(settled_);
+      if (ended < std::min<std::ptrdiff_t>(layers_.count(), end_of(settled_) + 1)) return;
+      copy_positions_behind(settled_);
+      if (has_normals_) copy_behind(settled_, [](Window& of) { return of.normals.data(); });
       begun_.push_back(user_.begin(at(settled_)));
+    }
+  }
+
+  // Goes on with the normals: a layer's triangles are added to those of its vertices, which are
+  // complete then, and of the next layer's.
+  void shade() {
+    const auto normals_of = [this](std::ptrdiff_t layer) {
+      Window& window = at(static_cast<std::size_t>(layer) / depth_);
+      return window.normals.data() + view(layer).first();
+    };
+    const std::ptrdiff_t count = layers_.count();
+    for (; shaded_ < count && (flat_.ended() == count || shaded_ + 1 < flat_.ended()); ++shaded_) {
+      const LayerView low = view(shaded_);
+      const bool is_last = shaded_ + 1 == count;
+      const LayerView high = is_last ? LayerView() : view(shaded_ + 1);
+      Vec3* const own = normals_of(shaded_);
+      Vec3* const next = is_last ? nullptr : normals_of(shaded_ + 1);
+      if (shaded_ == 0) std::fill_n(own, low.vertices(), Vec3{});
+      if (!is_last) std::fill_n(next, high.vertices(), Vec3{});
+      const std::uint64_t split = low.end();
+      const auto position = [&](std::uint32_t v) {
+        return v < split ? low.positions[v - low.first()] : high.positions[v - split];
+      };
+      for (const auto& [a, b, c] : low.triangles()) {
+        const Vec3 normal = normal_of(position(a), position(b), position(c));
+        for (const std::uint32_t v : {a, b, c}) {
+          Vec3& sum = v < split ? own[v - low.first()] : next[v - split];
+          sum = plus(sum, normal);
+        }
+      }
+      for (std::size_t v = 0; v < low.vertices(); ++v) own[v] = unit(own[v]);
     }
   }
 
@@ -260,6 +308,7 @@ class Walk {
   WindowUser& user_;
   const std::size_t threads_;
   const std::uint32_t depth_;
+  const bool has_normals_;
   const std::size_t count_;  // of windows
   std::vector<Window> slots_;
   std::vector<float> shares_;
@@ -269,6 +318,7 @@ class Walk {
   // Of the thread that smooths.
   std::optional<LayerSteps> steps_;
   FlatTriangles flat_;
+  std::ptrdiff_t shaded_ = 0;       // layers that have their normals
   std::size_t settled_ = 0;         // windows
   std::vector<std::size_t> begun_;  // the parts of those that have settled in this task
 
@@ -297,22 +347,23 @@ bool can_walk(const SmoothOptions& options) {
   return options.steps.empty() || options.steps.front().move == Move::kMean;
 }
 
-WalkEnd walk(SurfaceWindows& surface, const SmoothOptions& options, const Context& context,
-             WindowUser& user, std::uint32_t depth) {
-  if (depth == 0) depth = usual_depth(surface.count().triangles(), surface.layers());
+WalkEnd walk(SurfaceWindows& surface, const WalkOptions& options, const Context& context,
+             WindowUser& user) {
+  const std::uint32_t depth = depth_of(options, surface.count().triangles(), surface.layers());
   return Walk(surface, options, context, user, depth).run();
 }
 
-std::uint64_t walking_memory(const SmoothOptions& options, const SurfaceSize& size,
+std::uint64_t walking_memory(const WalkOptions& options, const SurfaceSize& size,
                              std::uint64_t plane_samples) {
-  const std::uint32_t depth = usual_depth(size.triangles, size.layers);
-  const std::uint64_t windows = windows_at_once(options.steps.size(), depth);
+  const std::uint32_t depth = depth_of(options, size.triangles, size.layers);
+  const std::uint64_t windows = windows_at_once(options, depth);
   const std::uint64_t vertices = std::min(size.vertices, (depth + 1) * size.largest_layer);
   // An open plane of triangles has two a vertex.
-  constexpr std::uint64_t kVertexBytes = sizeof(Vec3) + 2 * sizeof(Triangle);
+  const std::uint64_t vertex_bytes =
+      (options.normals ? 2 : 1) * sizeof(Vec3) + 2 * sizeof(Triangle);
   constexpr std::uint64_t kIndexBytes = 8 * sizeof(std::uint32_t);  // a sample
-  return windows * vertices * kVertexBytes +
-         size.largest_layer * step_bytes_per_vertex(options.steps.size()) +
+  return windows * vertices * vertex_bytes +
+         size.largest_layer * step_bytes_per_vertex(options.smooth.steps.size()) +
          static_cast<std::uint64_t>(thread_count()) * plane_samples * kIndexBytes;
 }
 

@@ -27,6 +27,13 @@ struct Window {
   Mesh mesh;
   // The triangles of the layer below the window, by its numbers, modulo 2^32.
   std::vector<Triangle> below;
+  Buffer<Vec3> normals;  // of all its vertices, if they were asked for, as vertex_normals has them
+};
+
+struct WalkOptions {
+  SmoothOptions smooth = {};
+  std::uint32_t depth = 0;  // the layers of a window; 0 chooses it
+  bool normals = false;
 };
 
 // Uses a surface.
@@ -64,14 +71,14 @@ struct WalkEnd {
 bool can_walk(const SmoothOptions& options);
 
 // Walks through the surface. The result, and what the user sees and does in order, does not depend
-// on the number of threads, nor on `depth`, the layers of a window; 0 chooses it. Throws Error
-// kCancelled, after a window's stage at the latest, and what the user throws.
-WalkEnd walk(SurfaceWindows& surface, const SmoothOptions& options, const Context& context,
-             WindowUser& user, std::uint32_t depth = 0);
+// on the number of threads, nor on the depth of windows. Throws Error kCancelled, after a window's
+// stage at the latest, and what the user throws.
+WalkEnd walk(SurfaceWindows& surface, const WalkOptions& options, const Context& context,
+             WindowUser& user);
 
 // An upper bound of the memory of a walk, in bytes, with the present number of threads, in a volume
 // whose planes have so many samples. Without the user's.
-std::uint64_t walking_memory(const SmoothOptions& options, const SurfaceSize& size,
+std::uint64_t walking_memory(const WalkOptions& options, const SurfaceSize& size,
                              std::uint64_t plane_samples);
 
 }  // namespace isomesh::mesh

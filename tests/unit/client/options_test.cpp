@@ -239,6 +239,18 @@ TEST_F(OptionsTest, MeshTakesEveryParameterOfTheTable) {
   EXPECT_GE(parameters, 30);
 }
 
+TEST_F(OptionsTest, MasksAreMeshedAsLabels) {
+  const Options all = options_from({"mesh", file_, "--masks", "-o", folder_ / "all.glb"});
+  EXPECT_TRUE(all.upload.masks);
+  ASSERT_TRUE(all.parameters.labels);
+  EXPECT_TRUE(all.parameters.labels->is_all());
+  EXPECT_EQ(all.parameters.smoothing, label_parameters({}).smoothing);
+  const Options one =
+      options_from({"mesh", file_, "--masks", "--labels", "2", "-o", folder_ / "one.stl"});
+  EXPECT_THAT(one.parameters.labels->values, ElementsAre(2));
+  EXPECT_FALSE(options_from(mesh({})).upload.masks);
+}
+
 TEST_F(OptionsTest, RefusesWrongUsageAndNamesTheOptionAndItsRange) {
   const std::vector<std::pair<Words, std::string>> refusals = {
       {{}, ""},
@@ -251,6 +263,7 @@ TEST_F(OptionsTest, RefusesWrongUsageAndNamesTheOptionAndItsRange) {
       {{"status", "7", "8"}, ""},
       {{"list", "--state", "melted"}, "--state: must be "},
       {{"completion", "cmd"}, "SHELL must be bash, zsh or fish"},
+      {{"mesh", file_, "--masks", "--iso", "1", "-o", drc_}, "--iso cannot be used with --masks"},
       {{"mesh", file_, "-o", drc_}, "--iso or --labels is required"},
       {{"mesh", file_, "--iso", "60"}, "-o is required"},
       {{"mesh", "/nowhere/head.nii", "--iso", "60", "-o", drc_},

@@ -27,6 +27,10 @@ Grid grid_of(const mesh::Mesh& mesh, int position_bits) {
       largest = std::max<double>(largest, std::abs(position[axis]));
     }
   }
+  if (!mesh.reach.is_empty()) {
+    std::ranges::copy(mesh.reach.low, grid.low.begin());
+    std::ranges::copy(mesh.reach.high, high.begin());
+  }
   double side = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) side = std::max(side, high[axis] - grid.low[axis]);
   grid.step = side / (std::exp2(position_bits) - 1);

@@ -83,7 +83,7 @@ TEST_F(EndingOrdersTest, LeaveNoObjectIfAnotherOneIsTooLarge) {
   OrderRequest request;
   request.source = {.pacs = "main", .study = kStudy, .series = kSeries};
   request.parameters = R"({"iso": 100})";
-  request.send = {{.pacs = "main"}, {.pacs = "main", .format = MeshFormat::kObj}};
+  request.send = {{.pacs = "main"}, {.pacs = "main", .format = SendFormat::kObj}};
   const std::string id = submit(request);
   ASSERT_TRUE(finish_job());
   ASSERT_TRUE(reaches(id, OrderState::kFailed));

@@ -61,7 +61,7 @@ TEST(ImportParameters, AreAllThatAreRead) {
   EXPECT_THAT(
       import_parameters(),
       UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order", "series",
-                           "member", "volume", "accept", "nifti_form", "modality"));
+                           "member", "masks", "volume", "accept", "nifti_form", "modality"));
 }
 
 TEST(ImportOptionsOf, TakesASeries) {
@@ -86,6 +86,7 @@ TEST(ImportOptionsOf, RefusesASeriesThatIsNoUid) {
 TEST(ImportOptionsOf, RawSamplesHaveNothingToChoose) {
   for (const auto& [name, value] : Pairs{{"series", "1.2"},
                                          {"member", "a.nrrd"},
+                                         {"masks", "true"},
                                          {"volume", "1"},
                                          {"accept", "frame-of-reference"},
                                          {"nifti_form", "sform"}}) {
@@ -104,6 +105,8 @@ TEST(ImportOptionsOf, TakesWhatChoosesAndAccepts) {
   EXPECT_EQ(options.volume, 0U);
   EXPECT_TRUE(options.accepts(NoteCode::kFrameOfReference));
   EXPECT_EQ(options.nifti_form, NiftiForm::kQform);
+  EXPECT_FALSE(options.masks);
+  EXPECT_TRUE(import_options_of(with_query({{"masks", "true"}})).masks);
   const auto none = import_options_of(with_query({}));
   EXPECT_FALSE(none.volume || none.nifti_form || none.accepts(NoteCode::kFrameOfReference));
 }
@@ -136,7 +139,8 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
                                 {"spacing", "1,1,0"},
                                 {"spacing", "1,1,nan"},
                                 {"modality", "mr"},
-                                {"nifti_form", "both"}}) {
+                                {"nifti_form", "both"},
+                                {"masks", "1"}}) {
     const Error error =
         error_of([&] { import_options_of(with_query({pair})); }, pair.first + '=' + pair.second);
     EXPECT_THAT(fields_of(error), ElementsAre(pair.first)) << pair.second;

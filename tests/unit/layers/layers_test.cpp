@@ -77,7 +77,8 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/http/requests", {"server/net", "server/store", "server/import/message"}},
     {"server/http/connections", {"server/http/requests"}},
     {"server/http/observe", {"server/callbacks", "server/jobs"}},
-    {"server/http/guards", {"server/http/connections", "server/http/observe"}},
+    {"server/http/oidc", {"server/http/requests"}},
+    {"server/http/guards", {"server/http/connections", "server/http/observe", "server/http/oidc"}},
     {"server/http/responses", {"server/http/requests"}},
     {"server/http/app",
      {"server/http/guards", "server/http/responses", "server/callbacks", "server/jobs"}},
@@ -88,8 +89,10 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"client/cli", {"client/isomesh"}},
     {"server/hospital/client", {"client/isomesh", "server/hospital/protocol"}},
     {"server/hospital/command", {"client/cli", "server/hospital/client"}},
-    {"client", {"server/hospital/command"}},
+    {"client/mcp", {"client/cli"}},
+    {"client", {"server/hospital/command", "client/mcp"}},
     {"client/verify", {"client/isomesh", "server/import/message"}},
+    {"client/kernels", {"server/jobs/making", "server/import/source"}},
 };
 
 // The layer that a folder is, or is a part of; empty for a folder that is in none.

@@ -97,7 +97,7 @@ TEST(LabelWalls, OfABallThatAPlaneCutsAreADiscAndTwoHalves) {
   const SurfaceCount count = count_walls(lattice, options, {});
   SeparatingSurface surface;
   extract_walls(lattice, options, count, {}, surface);
-  remove_stairs(lattice, options, count, 10, {}, surface);
+  remove_stairs(lattice, options, 10, {}, surface);
   areas = walls_between(surface);
   EXPECT_NEAR((areas[{1, 0}]), 2 * disc, 0.03 * 2 * disc);
   EXPECT_NEAR((areas[{2, 0}]), 2 * disc, 0.03 * 2 * disc);

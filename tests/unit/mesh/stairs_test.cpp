@@ -13,7 +13,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/labels/missing_volume.h"
+#include "server/mesh/stairs/missing_volume.h"
 #include "server/mesh/stairs/unfold.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/points.h"
@@ -39,7 +39,7 @@ Smoothed without_stairs(const Labels& volume, const SeparateOptions& options,
   const auto lattice = volume.lattice();
   const SurfaceCount count = count_walls(lattice, options, {});
   extract_walls(lattice, options, count, {}, result.surface);
-  result.effect = remove_stairs(lattice, options, count, most, {}, result.surface);
+  result.effect = remove_stairs(lattice, options, most, {}, result.surface);
   return result;
 }
 
@@ -80,13 +80,16 @@ std::map<std::int64_t, double> owed(const Labels& volume, const SeparateOptions&
   const auto lattice = volume.lattice();
   const SurfaceCount count = count_walls(lattice, options, {});
   extract_walls(lattice, options, count, {}, surface);
-  const WallFans fans(surface, [](const Triangle&) { return false; }, {});
-  const Buffer<float> missing = missing_volume(lattice, options, count, fans, {}, surface);
+  const WallShape shape(surface, lattice.dims, lattice.to_space, options.close, {});
+  const Buffer<float> missing = missing_volume(lattice, options.scheme, surface, shape, {});
+  const WallFans& fans = shape.fans();
+  const Lanes spacing = shape.spacing();
+  const double voxel = std::abs(double{spacing[0]} * spacing[1] * spacing[2]);
   std::map<std::int64_t, double> sums;
   for (std::size_t fan = 0; fan < fans.size(); ++fan) {
     const WallSides sides = fans.wall(fan).sides;
-    sums[sides.back] += missing[fan];
-    sums[sides.front] -= missing[fan];
+    sums[sides.back] += missing[fan] / voxel;
+    sums[sides.front] -= missing[fan] / voxel;
   }
   return sums;
 }
@@ -134,7 +137,7 @@ std::vector<Labels> cubes_at_borders(int size) {
 }
 
 TEST(Stairs, GiveLabelsAtTheBorderTheirVolume) {
-  const std::map<int, double> most_percent = {{1, 30}, {2, 8}, {3, 3}, {5, 2}, {8, 1}};
+  const std::map<int, double> most_percent = {{1, 22}, {2, 3}, {3, 1}, {5, 1}, {8, 0.5}};
   for (const auto& [size, most] : most_percent) {
     const double expected = size * size * size;
     for (const Labels& volume : cubes_at_borders(size)) {
@@ -157,7 +160,8 @@ TEST(Stairs, LeaveShortCurvesTheirLength) {
           high = std::max(high, position[axis]);
         }
         EXPECT_GT(high - low, 0.5F);
-        EXPECT_LT(high - low, 1.7F);
+        // In a corner of the volume, the bevels leave no other place for its volume.
+        EXPECT_LT(high - low, 1.9F);
       }
     }
   }

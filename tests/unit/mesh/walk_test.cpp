@@ -12,12 +12,15 @@
 #include <gtest/gtest.h>
 
 #include "base/mutex.h"
+#include "server/mesh/extract/joined_layers.h"
 #include "server/mesh/extract/slab_passes.h"
 #include "server/mesh/lattice/bcc_faces.h"
+#include "server/mesh/measure/normals.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/topology/window_topology.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
+#include "tests/support/memory_spool.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
 
@@ -30,6 +33,7 @@ using Bytes = test::SampleVolume<std::uint8_t>;
 // What is found of a surface, as a whole or in windows.
 struct Made {
   Mesh mesh;
+  Buffer<Vec3> normals;
   SmoothingEffect effect;
   Shapes extracted;
   Shapes smoothed;
@@ -43,6 +47,7 @@ bool are_same(const Extent& a, const Extent& b) {
 
 void expect_same(const Made& walked, const Made& whole) {
   EXPECT_TRUE(test::same_bytes(walked.mesh, whole.mesh));
+  EXPECT_TRUE(std::ranges::equal(walked.normals, whole.normals));
   EXPECT_TRUE(are_same(walked.effect.before, whole.effect.before));
   EXPECT_TRUE(are_same(walked.effect.after, whole.effect.after));
   EXPECT_EQ(walked.effect.mean_displacement_mm, whole.effect.mean_displacement_mm);
@@ -69,6 +74,7 @@ Made made_whole(const Case& one) {
   made.topology = measure_topology(made.mesh, {});
   made.effect = smooth(one.smooth, {}, made.mesh);
   made.smoothed = measure_shapes(made.mesh, {});
+  vertex_normals(made.mesh, {}, made.normals);
   return made;
 }
 
@@ -82,6 +88,7 @@ class Collector : public WindowUser {
     made_.mesh.layer_vertices = count.layer_vertices;
     made_.mesh.layer_triangles = count.layer_triangles;
     made_.mesh.positions.resize_for_overwrite(count.vertices());
+    made_.normals.resize_for_overwrite(count.vertices());
     made_.mesh.triangles.resize_for_overwrite(count.triangles());
   }
 
@@ -115,8 +122,11 @@ class Collector : public WindowUser {
     if (part == 0) {
       const std::size_t own = from.layer_vertices[from.layers() - 1];
       std::copy_n(from.positions.data(), own, made_.mesh.positions.data() + first);
+      std::copy_n(window.normals.data(), own, made_.normals.data() + first);
       // The vertices behind the window are copies of the next window's.
-      Tail tail = {first + own, {from.positions.begin() + own, from.positions.end()}};
+      Tail tail = {first + own,
+                   {from.positions.begin() + own, from.positions.end()},
+                   {window.normals.begin() + own, window.normals.begin() + from.positions.size()}};
       return [this, number, flags = flags_of(from, own), tail = std::move(tail), first] {
         tails_.push_back(tail);
         for (const std::size_t v : flags) {
@@ -134,9 +144,10 @@ class Collector : public WindowUser {
 
   Made made(const SmoothingEffect& effect) {
     EXPECT_TRUE(std::ranges::is_sorted(order_));
-    for (const auto& [first, positions] : tails_) {
+    for (const auto& [first, positions, normals] : tails_) {
       EXPECT_TRUE(std::ranges::equal(positions,
                                      made_.mesh.positions.span().subspan(first, positions.size())));
+      EXPECT_TRUE(std::ranges::equal(normals, made_.normals.span().subspan(first, normals.size())));
     }
     made_.effect = effect;
     made_.extracted = extracted_.result();
@@ -148,8 +159,12 @@ class Collector : public WindowUser {
   std::size_t bytes() const { return bytes_ * places_.size(); }
 
  private:
-  // Copies of positions, and the number of the first of them.
-  using Tail = std::pair<std::uint64_t, std::vector<Vec3>>;
+  // Copies of positions and normals, and the number of the first of them.
+  struct Tail {
+    std::uint64_t first;
+    std::vector<Vec3> positions;
+    std::vector<Vec3> normals;
+  };
 
   static std::vector<std::size_t> flags_of(const Mesh& mesh, std::size_t count) {
     std::vector<std::size_t> flags;
@@ -172,7 +187,7 @@ class Collector : public WindowUser {
 Made made_by_walk(const Case& one, std::uint32_t depth) {
   SurfaceWindows windows = windows_of(one);
   Collector collector(windows.count());
-  const WalkEnd end = walk(windows, one.smooth, {}, collector, depth);
+  const WalkEnd end = walk(windows, {one.smooth, depth, true}, {}, collector);
   return collector.made(end.effect);
 }
 
@@ -284,7 +299,7 @@ TEST(Walk, TakesAsMuchMemoryForTwiceAsManyLayers) {
     const Case one = {volume, {.iso = 60, .regularize = true}, {.steps = means(5, {1})}};
     SurfaceWindows windows = windows_of(one);
     Collector collector(windows.count());
-    walk(windows, one.smooth, {}, collector, 4);
+    walk(windows, {one.smooth, 4, true}, {}, collector);
     return collector.bytes();
   };
   const std::size_t bytes = bytes_of(64);
@@ -292,36 +307,12 @@ TEST(Walk, TakesAsMuchMemoryForTwiceAsManyLayers) {
   EXPECT_GT(bytes, 0U);
 }
 
-// A spool in memory. Can be full, and can spoil what is read.
-class MemorySpool : public Spool {
- public:
-  explicit MemorySpool(std::size_t most = std::size_t{1} << 30) : most_(most) {}
-
-  void write(std::uint64_t at, std::span<const std::byte> bytes) override {
-    const Lock lock(mutex_);
-    if (at + bytes.size() > most_) throw Error(ErrorCode::kOutOfSpace, "the spool is full");
-    if (bytes_.size() < at + bytes.size()) bytes_.resize(at + bytes.size());
-    std::ranges::copy(bytes, bytes_.begin() + static_cast<std::ptrdiff_t>(at));
-  }
-  void read(std::uint64_t at, std::span<std::byte> bytes) const override {
-    const Lock lock(mutex_);
-    std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(at), bytes.size(), bytes.begin());
-  }
-
-  std::size_t size() const { return bytes_.size(); }
-
- private:
-  const std::size_t most_;
-  mutable Mutex mutex_;
-  std::vector<std::byte> bytes_;
-};
-
 TEST(Walk, MakesTheSameWithASpool) {
   const Bytes volume = specks();
   for (const Scheme scheme : test::kSchemes) {
     for (const int threads : {1, 8}) {
       const test::ThreadCount several(threads);
-      MemorySpool spool;
+      test::MemorySpool spool;
       const Case one = {volume,
                         {.iso = 60, .scheme = scheme, .regularize = true},
                         {.steps = means(5, {1})},
@@ -332,9 +323,51 @@ TEST(Walk, MakesTheSameWithASpool) {
   }
 }
 
+// Looks at what the count holds whenever a layer is set aside.
+class WatchingSpool : public test::MemorySpool {
+ public:
+  void watch(const std::vector<ClusterLayer>& layers) { layers_ = &layers; }
+
+  void write(std::uint64_t at, std::span<const std::byte> bytes) override {
+    std::size_t held = 0;
+    for (const ClusterLayer& layer : *layers_) {
+      held += layer.words.size() * sizeof(JoiningWord) + layer.joined.size() * sizeof(Joined);
+    }
+    most_ = std::max(most_, held);
+    test::MemorySpool::write(at, bytes);
+  }
+  std::size_t most() const { return most_; }
+
+ private:
+  const std::vector<ClusterLayer>* layers_ = nullptr;
+  std::size_t most_ = 0;
+};
+
+TEST(SurfaceWindows, HoldWhatOneLayerJoinsWhileTheyCount) {
+  const test::ThreadCount one(1);
+  const auto most_of = [](std::uint32_t layers) {
+    const Bytes volume =
+        test::sample<std::uint8_t>(test::scaled(test::gyroid(8), 50, 60), {24, 24, layers});
+    const auto lattice = volume.lattice();
+    const ExtractOptions options = {.iso = 60, .regularize = true};
+    const Extraction extraction(lattice, options, std::uint8_t{60});
+    SurfaceCount count = empty_count(layers);
+    count.clusters.resize(layers);
+    WatchingSpool spool;
+    spool.watch(count.clusters);
+    JoinedLayers joined(count.clusters, &spool);
+    joined.prepare();
+    count_pass(extraction, {}, count, [&](std::uint32_t z) { joined.put_aside(z); });
+    return spool.most();
+  };
+  const std::size_t most = most_of(64);
+  EXPECT_EQ(most_of(128), most);
+  EXPECT_GT(most, 0U);
+}
+
 TEST(Walk, SaysThatTheSpoolIsFull) {
   const Bytes volume = specks();
-  MemorySpool spool(1000);
+  test::MemorySpool spool(1000);
   const Case one = {volume, {.iso = 60, .regularize = true}, {}, &spool};
   EXPECT_EQ(test::code_thrown_by([&] { windows_of(one); }), ErrorCode::kOutOfSpace);
 }
@@ -413,7 +446,7 @@ TEST(Walk, EndsWithWhatItsUserThrows) {
     for (const In in : {In::kSee, In::kBegin, In::kWork, In::kEnd}) {
       SurfaceWindows windows = windows_of(one);
       Thrower thrower(windows.count(), in);
-      EXPECT_THROW(walk(windows, one.smooth, {}, thrower, 2), std::runtime_error);
+      EXPECT_THROW(walk(windows, {one.smooth, 2, true}, {}, thrower), std::runtime_error);
     }
   }
 }
@@ -430,7 +463,9 @@ TEST(Walk, StopsWithinAWindow) {
                              }};
     SurfaceWindows windows = windows_of(one);
     Collector collector(windows.count());
-    EXPECT_EQ(test::code_thrown_by([&] { walk(windows, one.smooth, context, collector, 2); }),
+    EXPECT_EQ(test::code_thrown_by([&] {
+                walk(windows, {one.smooth, 2, true}, context, collector);
+              }),
               ErrorCode::kCancelled);
     EXPECT_LE(told, 10U + static_cast<std::size_t>(threads));
   }

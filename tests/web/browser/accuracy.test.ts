@@ -2,8 +2,8 @@
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { titleOf } from '../openapi';
-import { hues, silhouette } from './seen';
-import { ballNrrd, ballsNrrd, boxOf, holdMeshes, type JobAnswer, madeJob, openedJob, setup, still, surfaceLoaded } from './support';
+import { hues, silhouette, type Silhouette } from './seen';
+import { ballNrrd, ballsNrrd, boxOf, holdMeshes, type JobAnswer, madeJob, measured, noted, openedJob, openSurface, setup, still, surfaceLoaded } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -92,13 +92,23 @@ describe('distances', () => {
 
   it('are offered where an error was measured without them', async ({ daemon, page }) => {
     await openJob(page, await daemon.make({ volume: ball, iso: 100, passes: 3, formats: ['glb'], certify: true }));
-    await expect.poll(() => page.getByRole('button', { name: 'Distance', exact: true }).isVisible()).toBe(false);
-    const before = page.url();
+    const ruler = await measured(page, 40);
+    await page.keyboard.press('c');
+    await still(page);
+    const before = ['cut', 'rulers', 'cam'].map((name) => noted(page, name));
+    const address = new URL(page.url()).hash.split('?')[0];
     await page.getByRole('button', { name: 'Show the distance as colour' }).click();
-    await expect.poll(() => page.url()).not.toBe(before);
+    await page.locator('.legend').waitFor();
+    await still(page);
+    // Measured, with the way of looking as before.
+    expect(new URL(page.url()).hash.split('?')[0]).toBe(address);
+    expect(['cut', 'rulers', 'cam'].map((name) => noted(page, name))).toEqual(before);
+    expect(await page.locator('.ruler-labels span').innerText()).toBe(ruler);
+    expect((await openedJob(at)).parameters.distances).not.toBe(true);
+    // As the address says.
+    await page.reload();
     await surfaceLoaded(page);
     await page.locator('.legend').waitFor();
-    expect((await openedJob(at)).parameters).toMatchObject({ distances: true, certify: true });
   });
 });
 
@@ -126,7 +136,7 @@ describe('a surface that is not what was meant', () => {
   });
 
   // Of two balls, the smaller one is clicked: x grows to the patient's left, which from the front is on the right.
-  const clickedPart = async (action: string): Promise<{ told: string; mesh: JobAnswer['mesh'] }> => {
+  const clickedPart = async (): Promise<{ told: string; seen: Silhouette }> => {
     const { daemon, page } = at;
     const two = await daemon.upload(ballsNrrd(48));
     await openJob(page, await daemon.make({ volume: two, iso: 100, formats: ['glb'], passes: 0 }));
@@ -138,21 +148,11 @@ describe('a surface that is not what was meant', () => {
     await expect.poll(() => page.locator('.picked-part').isVisible()).toBe(false);
     await page.mouse.click(box.x + box.width * (0.5 + 0.4 * seen.width), box.y + box.height / 2);
     await expect.poll(() => page.locator('.picked-part').innerText()).toMatch(/^One of 2 connected components: volume [\d.]+ mm³, area [\d.]+ mm², .* triangles/);
-    const told = await page.locator('.picked-part').innerText();
-    const before = page.url();
-    await page.getByRole('button', { name: action }).click();
-    await expect.poll(() => page.url()).not.toBe(before);
-    return { told, mesh: (await madeJob(at)).mesh };
+    return { told: await page.locator('.picked-part').innerText(), seen };
   };
 
-  it('keeps the part alone that is clicked', async () => {
-    const { mesh } = await clickedPart('Keep only this component');
-    expect(mesh?.components).toBe(1);
-    expect(mesh?.bounds[0][0]).toBeGreaterThan(24);
-  });
-
-  it('tells how large the part is that is clicked, and leaves it out', async () => {
-    const { told, mesh } = await clickedPart('Drop this component');
+  it('tells how large the component is that is clicked, hides it, and shows it alone', async ({ page }) => {
+    const { told, seen } = await clickedPart();
     const [, volume, area] = /volume([\d.]+)mm³,area([\d.]+)mm²/.exec(told.replaceAll(/[\s\u202f]/g, '')) ?? [];
     // A ball of that radius, less what flat triangles cut off.
     const radius = 0.12 * 48;
@@ -160,8 +160,41 @@ describe('a surface that is not what was meant', () => {
       expect(part).toBeGreaterThan(0.9);
       expect(part).toBeLessThan(1.02);
     }
+    await page.getByRole('button', { name: 'Hide this component' }).click();
+    await still(page);
+    const larger = await silhouette(page, page.locator('.viewport'));
+    expect(larger.width).toBeLessThan(0.75 * seen.width);
+    await page.getByRole('button', { name: 'Show only this component' }).click();
+    await still(page);
+    const smaller = await silhouette(page, page.locator('.viewport'));
+    expect(smaller.width).toBeLessThan(0.8 * larger.width);
+  });
+
+  it('lists its components, marks the one that is pointed at, and makes one job of those that are ticked', async ({ daemon, page }) => {
+    const two = await daemon.upload(ballsNrrd(48));
+    const { id } = await daemon.make({ volume: two, iso: 100, formats: ['glb'], passes: 0 });
+    await openSurface(at, id);
+    await page.getByText('2 connected components').click();
+    const rows = page.locator('.components li');
+    await expect.poll(() => rows.count()).toBe(2);
+    await expect.poll(() => rows.last().innerText()).toMatch(/^volume [\d.\u202f]+ mm³, area [\d.\u202f]+ mm², [\d\u202f]+ triangles; at [-\d., ]+ mm$/);
+    const orange = async (): Promise<number> => {
+      await still(page);
+      return (await hues(page, page.locator('.viewport'))).red;
+    };
+    expect(await orange()).toBe(0);
+    await rows.last().hover();
+    await expect.poll(orange).toBeGreaterThan(300);
+    await page.mouse.move(5, 5);
+    await expect.poll(orange).toBe(0);
+    const make = page.getByRole('button', { name: 'Make what is shown' });
+    expect(await make.isDisabled()).toBe(true);
+    await rows.first().getByRole('checkbox').uncheck();
+    await make.click();
+    await expect.poll(() => page.url()).not.toContain(id);
+    const { mesh } = await madeJob(at);
     expect(mesh?.components).toBe(1);
-    expect(mesh?.bounds[1][0]).toBeLessThan(30);
+    expect(mesh?.bounds[0][0]).toBeGreaterThan(24);
   });
 });
 

@@ -4,7 +4,7 @@ import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
-import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
+import { chromium, type Browser, type BrowserContext, type Locator, type Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 
 // A head in magnetic resonance and its brain alone, of Debian's mricron-data. The brain's hull has a
@@ -141,7 +141,7 @@ export interface OpenPage {
 }
 
 export async function openPage(
-  browser: Browser,
+  browser: Browser | BrowserContext,
   origin: string,
   options: Parameters<Browser['newPage']>[0] = {},
 ): Promise<OpenPage> {

@@ -6,7 +6,7 @@ import { millimetres } from '@/ui/format';
 import { histogramPath, untangledText } from '@/views/jobs/certificate';
 import { stepsOf, totalOf } from '@/views/jobs/charts';
 import { errorAt, errorInWords, placeOf } from '@/views/prepare/error_slider';
-import { keepOnlyAt } from '@/views/surface/picked_part';
+import { keepOnlyAt } from '@/views/surface/component_list';
 
 describe('the slider of the largest error', () => {
   it('is off at its left end, and goes from 0.02 to 2 mm in steps of the same factor', () => {

@@ -103,6 +103,7 @@ describe('snippets', () => {
     expect(JSON.parse(execFileSync('python3', ['-c', read], { input: text }).toString())).toEqual(jobRequest(other));
     expect(text).toContain('os.environ["ISOMESH_TOKEN"]');
     expect(text).toContain('client.download(job, "mesh.stl")');
+    expect(text).toContain('import os, isomesh_client\n');
     const script = javascriptSnippet('http://h:1', other, false);
     expect(JSON.parse(/submitJob\((.*)\);/.exec(script)?.[1] ?? '')).toEqual(jobRequest(other));
     expect(script).toContain("client.meshOf(job, 'stl')");

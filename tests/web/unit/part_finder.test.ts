@@ -26,9 +26,12 @@ describe('the parts of a surface', () => {
     const finder = found(both);
     expect(finder.all).toHaveLength(2);
     expect(finder.partOf(0, 0)).toMatchObject({ triangles: 12, area: 6, point: [0, 0, 0] });
-    expect(finder.partOf(0, 36)).toMatchObject({ triangles: 12, area: 24, point: [100, 100, 100] });
-    expect([0, 36].map((corner) => Math.round(1e6 * (finder.partOf(0, corner)?.volume ?? 0)))).toEqual([1e6, 8e6]);
-    expect(finder.partOf(0, 999)).toBeNull();
+    expect(finder.partOf(0, 8)).toMatchObject({ triangles: 12, area: 24, point: [100, 100, 100] });
+    expect([0, 8].map((vertex) => Math.round(1e6 * (finder.partOf(0, vertex)?.volume ?? 0)))).toEqual([1e6, 8e6]);
+    expect(finder.partOf(1, 0)).toBeNull();
+    const index = finder.indexOf(0, (number) => number === finder.partOf(0, 8)?.number);
+    expect([index.length, Math.min(...index)]).toEqual([36, 8]);
+    expect(finder.indexOf(0, () => true)).toEqual(both.index);
   });
 
   it('go on across the seams of blocks', () => {

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { ApiError } from '@/api/problem';
 import type { UploadedVolume } from '@/api/types';
-import { outcomeOf, rejected } from '@/views/volumes/outcomes';
+import { mayBeMasks, outcomeOf, rejected } from '@/views/volumes/outcomes';
 import { openQuestion, spacingOf } from '@/views/volumes/remedies';
 
 const question = new ApiError(422, 'Unusable volume', 'two series', [], { choices: [{ parameter: 'series', value: '1.2', title: 'head' }] });
@@ -23,6 +23,26 @@ describe('a question of the server', () => {
     expect(asked?.choices).toEqual({ member: 'a.dcm' });
     const after = rejected(outcomeOf(uploaded, {}), { member: 'a.dcm', series: '1.2' }, wrong);
     expect([after.error, after.asked]).toEqual([wrong, asked]);
+  });
+});
+
+describe('volumes of one upload', () => {
+  const stored = (dims: number[], range: number[], ...codes: string[]): UploadedVolume =>
+    ({ member: 'a.nii', status: 201, problem: null, volume: { dims, range, notes: codes.map((code) => ({ code })) } }) as unknown as UploadedVolume;
+  const mask = stored([4, 3, 2], [0, 1], 'looks-like-labels');
+  const empty = stored([4, 3, 2], [0, 0]);
+  const maybe = (...uploaded: UploadedVolume[]): boolean => mayBeMasks(uploaded.map((each) => outcomeOf(each, {})));
+
+  it('are offered as masks if all may be some', () => {
+    expect(maybe(mask, empty)).toBe(true);
+    expect(maybe(mask)).toBe(false);
+    for (const other of [
+      stored([4, 3, 9], [0, 1], 'looks-like-labels'),
+      stored([4, 3, 2], [-1024, 3071]),
+      stored([4, 3, 2], [1, 2], 'looks-like-labels'),
+      { member: 'b.nii', status: 422, volume: null, problem: { title: '', detail: '', status: 422 } } as unknown as UploadedVolume,
+    ])
+      expect(maybe(mask, other)).toBe(false);
   });
 });
 

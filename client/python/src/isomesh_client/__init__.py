@@ -12,11 +12,13 @@ uploaded. `isomesh_client.api` has the types of the server's requests and respon
 """
 
 from . import api
+from .batches import Result
 from .client import Client
 from .errors import IsomeshError, JobFailed, Refused, Unreachable, VolumeWarning, WrongAnswer
 from .mesh import Mesh, read_ply
 from .uploads import Raw
 from .version import __version__
+from .viewer import View, view
 
 __all__ = [
     "Client",
@@ -25,10 +27,13 @@ __all__ = [
     "Mesh",
     "Raw",
     "Refused",
+    "Result",
     "Unreachable",
+    "View",
     "VolumeWarning",
     "WrongAnswer",
     "__version__",
     "api",
     "read_ply",
+    "view",
 ]

@@ -9,10 +9,11 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union, cast
 from urllib.parse import quote, urlencode
 
 from . import answers, busy, ply, uploads
+from .batches import Batches
 from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
 from .exchange import Exchange
 from .files import FINAL_STATES, Arriving, file_of, format_of, written
@@ -33,7 +34,7 @@ _SHORTEST_LOOK = 0.2
 _LOOKS_LIKE_LABELS = "looks-like-labels"
 
 
-class Client:
+class Client(Batches):
     """A client of one server. It is constant after construction: several threads may share it.
 
     server       http://HOST:PORT, https://HOST:PORT or unix:PATH. Default: ISOMESH_SERVER of the
@@ -67,6 +68,9 @@ class Client:
         authorities = authorities or environment("ISOMESH_CA") or None
         self._exchange = Exchange(Transport(self.server, token, authorities, timeout, retry_seconds))
 
+    def __repr__(self) -> str:
+        return f"<Client of {self.server}>"
+
     @by_keywords
     def mesh(
         self,
@@ -79,6 +83,7 @@ class Client:
         name: str = "",
         series: str = "",
         member: str = "",
+        masks: bool = False,
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
@@ -118,25 +123,9 @@ class Client:
         of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(each, keywords[each])}
         if affine_space != "ras":
             of_upload["affine_space"] = affine_space
-        stored = self._stored(source, of_upload)
-        if stored is None:
-            stored = self._upload_one(source, "labels" in parameters, of_upload)
         formats = parameters.get("formats", [])
         parameters["formats"] = formats if "ply" in formats else [*formats, "ply"]
-        key = uuid.uuid4().hex
-        try:
-            done = self.wait(self._submit(stored, key, parameters), progress=progress)
-        except IsomeshError:
-            raise
-        except BaseException:  # an interrupt, or an exception of `progress`
-            with contextlib.suppress(Exception):
-                # The key finds the job even if its response was interrupted.
-                parting = copy.copy(self)
-                parting._exchange = self._exchange.within(busy.PARTING_SECONDS)
-                parting.cancel(parting._submit(stored, key, parameters))
-            raise
-        if done["mesh"]["empty"]:
-            warn(f"the surface is empty: {why_empty(done, stored)}")
+        stored, done = self._made(source, of_upload, parameters, progress)
         return self._fetch(done, stored["notes"])
 
     # --- Volumes ---------------------------------------------------------------------------------
@@ -152,6 +141,7 @@ class Client:
         name: str = "",
         series: str = "",
         member: str = "",
+        masks: bool = False,
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
@@ -169,6 +159,8 @@ class Client:
                   samples along each axis. An array with neither has 1 mm, as raw samples have
         raw       for a path or bytes: describes them as raw samples
         name      the volume's name. Default: the name of the file or of its series
+        masks     True says that the files of a folder or list are masks of one structure each. They become
+                  one volume of labels with the files' names; `mesh` then makes all, unless `labels` is given
         modality  "ct" says that the samples are Hounsfield units, if the file does not say so. The volume
                   then has the presets of a CT, such as iso="bone"
 
@@ -306,17 +298,17 @@ class Client:
             # A server that responds at once does not make this a busy loop.
             time.sleep(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
 
-    def job_labels(self, job: Union[str, AnyJob]) -> Iterator[api.LabelSummary]:
+    def job_labels(self, job: Union[str, AnyJob]) -> List[api.LabelSummary]:
         """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
         number, `job["mesh"]["labels_count"]`."""
         pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
-        return cast("Iterator[api.LabelSummary]", pages)
+        return cast("List[api.LabelSummary]", list(pages))
 
-    def job_walls(self, job: Union[str, AnyJob]) -> Iterator[api.WallSummary]:
+    def job_walls(self, job: Union[str, AnyJob]) -> List[api.WallSummary]:
         """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None.
         In ascending order of labels."""
         pages = self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, {})
-        return cast("Iterator[api.WallSummary]", pages)
+        return cast("List[api.WallSummary]", list(pages))
 
     def report(self, job: Union[str, AnyJob]) -> api.JobReport:
         """What a succeeded job made, of what and how: to keep beside its mesh."""
@@ -394,6 +386,31 @@ class Client:
 
     # --- How -------------------------------------------------------------------------------------
 
+    def _made(
+        self, source: Any, of_upload: Mapping[str, Any], parameters: Mapping[str, Any], progress: Optional[Progress]
+    ) -> Tuple[api.Volume, api.SucceededJob]:
+        """The volume of a source, which is uploaded if needed, and its job, which has succeeded."""
+        if of_upload.get("masks") and "iso" not in parameters:
+            parameters = {"labels": "all", **parameters}
+        stored = self._stored(source, of_upload)
+        if stored is None:
+            stored = self._upload_one(source, "labels" in parameters, of_upload)
+        key = uuid.uuid4().hex
+        try:
+            done = self.wait(self._submit(stored, key, parameters), progress=progress)
+        except IsomeshError:
+            raise
+        except BaseException:  # an interrupt, or an exception of `progress`
+            with contextlib.suppress(Exception):
+                # The key finds the job even if its response was interrupted.
+                parting = copy.copy(self)
+                parting._exchange = self._exchange.within(busy.PARTING_SECONDS)
+                parting.cancel(parting._submit(stored, key, parameters))
+            raise
+        if done["mesh"]["empty"]:
+            warn(f"the surface is empty: {why_empty(done, stored)}")
+        return stored, done
+
     def _stored(self, source: Any, of_upload: Mapping[str, Any]) -> Optional[api.Volume]:
         """The stored volume that `source` names; None for a source to upload."""
         if isinstance(source, Mapping):
@@ -415,6 +432,7 @@ class Client:
         chosen = {
             "series": get("series", ""),
             "member": get("member", ""),
+            "masks": "true" if get("masks", False) else "",
             "volume": "" if number is None else str(int(number)),
             "accept": ",".join(get("accept", ())),
             "nifti_form": get("nifti_form", ""),
@@ -450,13 +468,16 @@ class Client:
         return Mesh(**ply.parse(data), job=job, notes=notes, download=self.download)
 
 
-_UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form", "modality")
+_UPLOAD_KEYWORDS = (
+    *("affine", "spacing", "raw", "name"),
+    *("series", "member", "masks", "volume", "accept", "nifti_form", "modality"),
+)
 
 
 def _is_empty(keyword: str, value: Any) -> bool:
     """True for a keyword's default. An empty place is no default but an error."""
     is_place = keyword in ("affine", "spacing")
-    return value is None or not is_place and isinstance(value, (str, tuple, list)) and not value
+    return value is None or value is False or not is_place and isinstance(value, (str, tuple, list)) and not value
 
 
 def _id_of(thing: Any) -> str:

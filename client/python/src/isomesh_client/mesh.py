@@ -8,7 +8,7 @@ from array import array
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, Optional, Sequence, Union
 
-from . import files, ply
+from . import files, ply, viewer
 
 if TYPE_CHECKING:
     import os
@@ -180,6 +180,26 @@ class Mesh:
             labels.SetName("label")
             surface.GetCellData().SetScalars(labels)
         return surface
+
+    def to_pyvista(self) -> Any:
+        """The mesh as a pyvista.PolyData, as `to_vtk` describes it. Needs the package pyvista."""
+        return _package("pyvista", "mesh.to_pyvista()", "pyvista").wrap(self.to_vtk())
+
+    def to_meshio(self) -> Any:
+        """The mesh as a meshio.Mesh of triangles, which it writes to its formats: `mesh.to_meshio().write("head.vtu")`.
+        Labels become the cell data "label". The arrays are copied. Needs the package meshio."""
+        meshio = _package("meshio", "mesh.to_meshio()", "meshio")
+        numpy = _package("numpy", "mesh.to_meshio()", "numpy")
+        labels = {} if self.labels is None else {"label": [numpy.array(self.labels)]}
+        corners = numpy.array(self.faces, "int64")
+        return meshio.Mesh(numpy.array(self.vertices), [("triangle", corners)], cell_data=labels)
+
+    def _repr_html_(self) -> Optional[str]:
+        """The mesh as a notebook shows it; see `isomesh_client.view`. None, so that `repr` is shown, without numpy and for
+        an empty mesh."""
+        if isinstance(self.vertices, memoryview) or not len(self.faces):
+            return None
+        return viewer.view(self)._repr_html_()
 
     def __repr__(self) -> str:
         return f"<Mesh of {len(self.faces)} triangles and {len(self.vertices)} vertices, mm, {self.space.upper()}>"

@@ -339,8 +339,11 @@ def _distance(one: List[List[float]], other: List[List[float]], dims: Sequence[i
     )
 
 
-def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]]) -> Body:
-    """The samples of a numpy array with the axes x, y and z, sent plane by plane."""
+def described(
+    array: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]]
+) -> Tuple[Any, Any, Raw]:
+    """The samples of an array with the axes x, y and z as a numpy array of three axes, the type to have them in, and
+    their description."""
     import numpy
 
     samples = numpy.asanyarray(array)
@@ -360,11 +363,18 @@ def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Se
         affine = [[steps[row] if row == column else 0.0 for column in range(4)] for row in range(3)]
         space = "lps"
     x, y, z = samples.shape
-    raw = Raw((x, y, z), target.name, **placed(affine, space))
+    return samples, target, Raw((x, y, z), target.name, **placed(affine, space))
+
+
+def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]]) -> Body:
+    """The samples of a numpy array with the axes x, y and z, sent plane by plane."""
+    import numpy
+
+    samples, target, raw = described(array, affine, space, spacing)
     little = target.newbyteorder("<")
 
     def pieces() -> Iterator[bytes]:
-        for index in range(z):
+        for index in range(raw.dims[2]):
             plane: bytes = numpy.asarray(samples[:, :, index]).astype(little).tobytes(order="F")
             yield plane
 

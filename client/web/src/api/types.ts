@@ -3,6 +3,9 @@ import type { components, operations } from '../../generated/api';
 
 type Schemas = components['schemas'];
 
+export type Login = Schemas['Login'];
+export type LoginProvider = Schemas['LoginProvider'];
+
 // The type of a global class, from the "dom" library or @types/node. A project with neither gets `Otherwise`, so that
 // it can compile the module's types, too.
 type Global<Name extends string, Otherwise> = typeof globalThis extends Record<Name, { prototype: infer Instance }>

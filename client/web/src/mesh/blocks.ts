@@ -1,7 +1,5 @@
-// Arrays of triangles made ready for drawing: blocks of 16-bit indices, normals, borders, and a
-// coarse copy for the time that it is turned.
+// Arrays of triangles made ready for drawing: blocks of 16-bit indices, normals and borders.
 import type { Vec3 } from '../api/types';
-import { clustered, compacted, meanEdge, type Coarse } from './coarse';
 import { splitCreases } from './creases';
 
 export interface Triangles {
@@ -15,8 +13,6 @@ export interface Triangles {
 export interface Block {
   positions: Float32Array<ArrayBuffer>;
   index: Uint16Array<ArrayBuffer>;
-  // Fewer triangles, of some of its vertices.
-  coarse: Coarse;
   // Four numbers of 16 bits a vertex, normalised; the fourth is there to align the vertices to 4 bytes.
   normals: Int16Array<ArrayBuffer>;
   // Vertices on edges of one triangle, where the neighbouring block goes on, and their normals before
@@ -30,13 +26,14 @@ export interface Block {
 
 const mostVertices = 65_535;
 export const mostTriangles = 65_000;
-// Edge lengths that one cell of the coarse copy spans at least.
-const coarseness = 3.5;
-// About as many triangles does the coarse copy of a whole surface have at least.
-const coarseTriangles = 30_000;
+
+interface Named {
+  positions: Float32Array;
+  index: ArrayLike<number>;
+}
 
 // The triangles' normals times twice their area, three numbers each.
-function triangleNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
+export function triangleNormals({ positions, index }: Named): Float32Array<ArrayBuffer> {
   const normals = new Float32Array(index.length);
   for (let i = 0; i + 2 < index.length; i += 3) {
     const a = 3 * (index[i] as number);
@@ -59,7 +56,7 @@ function triangleNormals({ positions, index }: Triangles): Float32Array<ArrayBuf
 }
 
 // Their sums at each vertex, three numbers each.
-function vertexSums({ positions, index }: Triangles, normals: Float32Array): Float32Array<ArrayBuffer> {
+export function vertexSums({ positions, index }: Named, normals: Float32Array): Float32Array<ArrayBuffer> {
   const sums = new Float32Array(positions.length);
   for (let corner = 0; corner < index.length; corner += 1) {
     const vertex = 3 * (index[corner] as number);
@@ -78,7 +75,7 @@ export function packNormal(normals: Int16Array, vertex: number, x: number, y: nu
   normals[4 * vertex + 2] = length > 0 ? Math.round(z * scale) : 32_767;
 }
 
-function packedNormals(sums: Float32Array): Int16Array<ArrayBuffer> {
+export function packedNormals(sums: Float32Array): Int16Array<ArrayBuffer> {
   const normals = new Int16Array((sums.length / 3) * 4);
   for (let vertex = 0; 3 * vertex < sums.length; vertex += 1) {
     const at = 3 * vertex;
@@ -126,12 +123,6 @@ export function borderVertices(index: ArrayLike<number>, vertices: number): Uint
     if (isMarked === 1) border[used++] = vertex;
   });
   return border;
-}
-
-// The size of cells that leave at least about `coarseTriangles` of a surface of that area: about six for each square of a cell's
-// side, and several times as many where bone or cortex is folded.
-export function coarseCell(area: number): number {
-  return Math.sqrt((6 * area) / coarseTriangles);
 }
 
 // Parts of consecutive triangles, each with the vertices that it names: few enough for 16-bit indices.
@@ -186,15 +177,14 @@ export function boundsOf(positions: ArrayLike<number>): [Vec3, Vec3] {
   return [low, high];
 }
 
-// `cell` is the least size of the coarse copy's cells. `hasCreases`: sharp edges are shaded as such.
-export function prepare(whole: Triangles, cell = 0, hasCreases = false): Block {
+// `hasCreases`: sharp edges are shaded as such.
+export function prepare(whole: Triangles, hasCreases = false): Block {
   const border = borderVertices(whole.index, whole.positions.length / 3);
   const ofTriangles = triangleNormals(whole);
   const triangles = hasCreases ? splitCreases(whole, ofTriangles, border, mostVertices) : whole;
   const { positions, index } = triangles;
   const sums = vertexSums(triangles, ofTriangles);
   const normals = packedNormals(sums);
-  const cells = { size: Math.max(cell, coarseness * meanEdge(triangles)), areByOctant: true };
   const borderNormals = new Float32Array(3 * border.length);
   border.forEach((vertex, i) => {
     borderNormals.set(sums.subarray(3 * vertex, 3 * vertex + 3), 3 * i);
@@ -202,7 +192,6 @@ export function prepare(whole: Triangles, cell = 0, hasCreases = false): Block {
   return {
     positions,
     index: Uint16Array.from(index),
-    coarse: compacted({ ...triangles, normals }, clustered({ positions, index, normals }, border, cells)),
     normals,
     border,
     borderNormals,

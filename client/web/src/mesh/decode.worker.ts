@@ -14,8 +14,6 @@ export interface DecodeRequest {
   positionId: number | null;
   // The number of the attribute of distances; null: it has none.
   distanceId: number | null;
-  // The least size of the coarse copy's cells, in millimetres.
-  cell: number;
   // True if sharp edges are shaded as such: those of labels, at their walls.
   hasCreases: boolean;
 }
@@ -92,8 +90,8 @@ function owned(array: Float32Array<ArrayBuffer>): Float32Array<ArrayBuffer> {
   return array.byteLength < array.buffer.byteLength ? array.slice() : array;
 }
 
-function blockOf(triangles: Triangles, { cell, hasCreases }: DecodeRequest): Block {
-  const block = prepare(triangles, cell, hasCreases);
+function blockOf(triangles: Triangles, { hasCreases }: DecodeRequest): Block {
+  const block = prepare(triangles, hasCreases);
   return { ...block, positions: owned(block.positions), ...(block.distances && { distances: owned(block.distances) }) };
 }
 

@@ -3,7 +3,7 @@ import { client, connected } from '../client';
 import { ApiError, asApiError, unreachable } from '../api/problem';
 import { sleep } from '../api/sleep';
 import type { Job, MeshFile } from '../api/types';
-import { coarseCell, type Block } from './blocks';
+import type { Block } from './blocks';
 import { GlbReader, type Part, type Primitive } from './glb';
 import { decoders } from './pool';
 import { viewableFile } from './shown';
@@ -99,12 +99,11 @@ export async function loadMesh(
     totalBytes: file.bytes,
     totalTriangles: job.mesh?.triangles ?? 0,
   };
-  const cell = coarseCell(job.mesh?.area_mm2 ?? 0);
   const began = performance.now();
   const decoding: Promise<void>[] = [];
   const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: Primitive | undefined): void => {
     const { arrays, positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
-    const done = decoders.decode(bytes, { arrays, positionId, distanceId, cell, hasCreases: part !== null }, signal).then((blocks) => {
+    const done = decoders.decode(bytes, { arrays, positionId, distanceId, hasCreases: part !== null }, signal).then((blocks) => {
       if (signal.aborted) return;
       listener.onBlocks(blocks, part, isCoarse);
     });

@@ -49,10 +49,23 @@ export class PartFinder {
     return [...this.parts.values()];
   }
 
-  // Of the triangle of that block whose first corner is there in its index.
-  partOf(block: number, corner: number): PartSummary | null {
-    const vertex = this.blocks[block]?.index[corner];
-    return vertex === undefined ? null : (this.parts.get(this.rootOf((this.firsts[block] as number) + vertex)) ?? null);
+  // Of that block's vertex.
+  partOf(block: number, vertex: number): PartSummary | null {
+    const first = this.firsts[block];
+    return first === undefined ? null : (this.parts.get(this.rootOf(first + vertex)) ?? null);
+  }
+
+  // The triangles of that block which belong to parts that are wanted, by their numbers.
+  indexOf(block: number, isWanted: (part: number) => boolean): Uint16Array<ArrayBuffer> {
+    const { index } = this.blocks[block] ?? { index: new Uint16Array() };
+    const kept = new Uint16Array(index.length);
+    let used = 0;
+    for (let i = 0; i + 2 < index.length; i += 3) {
+      if (!isWanted(this.partOf(block, index[i] as number)?.number ?? -1)) continue;
+      kept.set(index.subarray(i, i + 3), used);
+      used += 3;
+    }
+    return kept.slice(0, used);
   }
 
   private rootOf(vertex: number): number {

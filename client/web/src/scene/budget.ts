@@ -26,9 +26,9 @@ export const efforts: readonly Effort[] = [
   { triangles: 32_000, sharpness: 0.7 },
   { triangles: 16_000, sharpness: 0.6 },
   { triangles: 16_000, sharpness: 0.5 },
-  { triangles: 8_000, sharpness: 0.42 },
-  { triangles: 8_000, sharpness: 0.35 },
-  { triangles: 4_000, sharpness: 0.25 },
+  { triangles: 16_000, sharpness: 0.42 },
+  { triangles: 16_000, sharpness: 0.35 },
+  { triangles: 16_000, sharpness: 0.25 },
 ];
 const firstEffort = 2;
 

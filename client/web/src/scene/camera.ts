@@ -1,5 +1,6 @@
 // What follows from where a camera stands.
 import { AmbientLight, DirectionalLight, Vector3, type Camera, type PerspectiveCamera, type Scene } from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import type { CameraPlace } from './views';
 
@@ -45,4 +46,16 @@ export function addLights(scene: Scene, camera: Camera): void {
   headlight.target.position.set(0, 0, -1);
   camera.add(headlight, headlight.target);
   scene.add(camera, new AmbientLight(0xffffff, 0.6));
+}
+
+export function controlsOf(camera: PerspectiveCamera, canvas: HTMLCanvasElement, on: Record<'start' | 'end' | 'change', () => void>): OrbitControls {
+  const controls = new OrbitControls(camera, canvas);
+  controls.zoomToCursor = true;
+  controls.rotateSpeed = 0.9;
+  for (const name of ['start', 'end', 'change'] as const) controls.addEventListener(name, on[name]);
+  return controls;
+}
+
+export function placeOf({ position }: PerspectiveCamera, { target: { x, y, z } }: OrbitControls): CameraPlace {
+  return { offset: [position.x - x, position.y - y, position.z - z], target: [x, y, z] };
 }

@@ -4,11 +4,9 @@ import {
   BackSide,
   Box3,
   BufferAttribute,
-  BufferGeometry,
-  DoubleSide,
-  FrontSide,
+  type BufferGeometry,
   Mesh,
-  MeshPhongMaterial,
+  type MeshPhongMaterial,
   type Object3D,
   type Plane,
   Sphere,
@@ -18,22 +16,23 @@ import {
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
 import type { Coarse } from '../mesh/coarse';
-import type { CoarseAnswer } from '../mesh/coarse.worker';
 import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
+import { geometryOf, labelMaterials, material, neutral } from './materials';
 import { firstMet, type Interval } from './pick';
 import { placeholder } from './placeholder';
 import { defaultStyle, type SurfaceStyle } from './style';
 import type { Uploading } from './uploading';
+import { Wires, type Wire } from './wires';
 
 export interface Hit {
   at: number; // along the ray
   label: Label | null;
   distance?: number; // where the surface has distances
-  // Which of the finest blocks, and the first corner of the triangle in its index; of a coarse level, -1.
+  // Which of the finest blocks, and a vertex of it; of a coarse level, -1.
   block: number;
-  corner: number;
+  vertex: number;
 }
 
 interface Look {
@@ -45,16 +44,19 @@ interface Look {
   level: { seams: Seams; blocks: number };
   // A coarse copy of all its blocks, drawn while it moves. Its meshes are as those of a block.
   copy: Drawn[];
+  copyWire: Wire;
   showsDistance: boolean;
   opacity: number;
 }
 
 type Drawn = Mesh<BufferGeometry, MeshPhongMaterial>;
 
-interface DrawnBlock {
+export interface DrawnBlock {
   // One mesh; of a label two, for its front and for its back.
   meshes: Drawn[];
   geometry: BufferGeometry;
+  // Its edges, once they are seen.
+  wire: Wire | null;
   look: Look;
   label: Label | null;
   isLevel: boolean;
@@ -64,34 +66,7 @@ interface DrawnBlock {
   isThere: boolean; // at the graphics processor
 }
 
-const neutral = '#dcd6c8';
 const wiresPerFrame = 4;
-
-function material(colour: string): MeshPhongMaterial {
-  return new MeshPhongMaterial({ color: colour, specular: 0x1c1c1c, shininess: 24, side: DoubleSide });
-}
-
-function geometryOf({ positions, normals, distances }: Omit<Coarse, 'index'>, index: Uint16Array | Uint32Array): BufferGeometry {
-  const made = new BufferGeometry();
-  made.setAttribute('position', new BufferAttribute(positions, 3));
-  made.setAttribute('normal', new BufferAttribute(normals, 4, true));
-  if (distances) made.setAttribute('distanceMm', new BufferAttribute(distances, 1));
-  made.setIndex(new BufferAttribute(index, 1));
-  return made;
-}
-
-// The wall that two labels share is there for each of them, and seen from inside of one it is the other's
-// front. Backs lie a little farther away, so that the two do not fight for the same depth.
-function labelMaterials(colour: string): MeshPhongMaterial[] {
-  const front = material(colour);
-  const back = material(colour);
-  front.side = FrontSide;
-  back.side = BackSide;
-  back.polygonOffset = true;
-  back.polygonOffsetFactor = 1;
-  back.polygonOffsetUnits = 1;
-  return [front, back];
-}
 
 export class Parts {
   private readonly blocks: DrawnBlock[] = [];
@@ -108,6 +83,7 @@ export class Parts {
   private isCoarse = false;
   private isWhole = false;
   private readonly shader = new DistanceShader();
+  private readonly wires = new Wires();
   // What a surface without labels is drawn with, so that its shader is there before its first block.
   private readonly usual = material(neutral);
   private readonly probe = new Mesh(placeholder(), this.usual);
@@ -118,7 +94,7 @@ export class Parts {
     private readonly draw: () => void,
   ) {
     this.probe.visible = false;
-    scene.add(this.probe);
+    scene.add(this.probe, this.wires.probe);
   }
 
   // Whether they are drawn with shaders that may not be there.
@@ -134,7 +110,7 @@ export class Parts {
       const meshes = look.materials.map((made) => new Mesh(geometry, made));
       const owner = isLevel ? look.level : look;
       const member = owner.blocks;
-      const drawn: DrawnBlock = { meshes, geometry, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
+      const drawn: DrawnBlock = { meshes, geometry, wire: null, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
       this.uploading.add({
         geometries: [geometry],
         onThere: () => {
@@ -166,7 +142,7 @@ export class Parts {
     this.shader.setTop(millimetres);
   }
 
-  private get finest(): DrawnBlock[] {
+  get finest(): readonly DrawnBlock[] {
     return this.blocks.filter(({ isLevel }) => !isLevel);
   }
 
@@ -174,6 +150,30 @@ export class Parts {
   get finder(): PartFinder {
     this.known ??= new PartFinder(this.finest.map(({ made }) => made));
     return this.known;
+  }
+
+  // The triangles that are drawn of each of the finest blocks; null: all.
+  setIndex(indexOf: ((block: number) => Uint16Array<ArrayBuffer>) | null): void {
+    this.finest.forEach(({ geometry, made }, at) => {
+      geometry.setIndex(new BufferAttribute(indexOf?.(at) ?? made.index, 1));
+      this.wires.forget(geometry);
+    });
+    this.takeCopies([]);
+    this.showAll();
+  }
+
+  // Takes all blocks away.
+  clear(): void {
+    for (const { meshes, geometry, wire } of this.blocks.splice(0)) {
+      this.scene.remove(...meshes, ...(wire ? [wire] : []));
+      this.wires.forget(geometry);
+      geometry.dispose();
+    }
+    this.takeCopies([]);
+    for (const { copy, copyWire } of this.looks.values()) this.scene.remove(...copy, copyWire);
+    this.looks.clear();
+    this.known = null;
+    this.isWhole = false;
   }
 
   // Those of the finest blocks that can be drawn.
@@ -194,6 +194,7 @@ export class Parts {
   // What is on the other side of these planes is not seen.
   setCut(planes: Plane[] | null): boolean {
     this.planes = planes;
+    this.wires.setCut(planes);
     const isOther = this.applyAll();
     this.showAll();
     return isOther;
@@ -231,8 +232,11 @@ export class Parts {
   }
 
   // Coarse copies of its surfaces, by their numbers; in place of those before.
-  takeCopies(levels: CoarseAnswer): void {
-    for (const { geometry } of this.copies.flat()) geometry.dispose();
+  takeCopies(levels: readonly (readonly Coarse[])[]): void {
+    for (const { geometry } of this.copies.flat()) {
+      this.wires.forget(geometry);
+      geometry.dispose();
+    }
     this.copies = levels.map((surfaces) =>
       surfaces.map((made) => ({ geometry: geometryOf(made, made.index), triangles: made.index.length / 3 })),
     );
@@ -240,6 +244,7 @@ export class Parts {
       if (look.copy.length > 0) continue;
       look.copy = look.materials.map((made) => new Mesh(placeholder(), made));
       this.place(look.copy);
+      this.scene.add(look.copyWire);
     }
     this.setLevel(this.level);
   }
@@ -270,7 +275,7 @@ export class Parts {
     const share = this.blocks.length / steps;
     this.blocks.forEach((block, at) => {
       if (step === null || Math.floor(at / share) === step) this.show(block);
-      else for (const mesh of block.meshes) mesh.visible = false;
+      else this.hide(block);
     });
   }
 
@@ -285,18 +290,19 @@ export class Parts {
     for (const block of this.blocks) {
       const { geometry, made } = block;
       if (!this.isSeen(block) || !geometry.boundingBox || !ray.intersectsBox(geometry.boundingBox)) continue;
-      const met = firstMet(made.positions, made.index, ray, { from, to: end });
+      const met = firstMet(made.positions, geometry.getIndex()?.array ?? [], ray, { from, to: end });
       if (met.corner < 0) continue;
       end = met.at;
       nearest = { block, corner: met.corner };
     }
     if (!nearest) return null;
     const { block, corner } = nearest;
-    const { label, distances, made } = block;
-    const place = { block: this.finest.indexOf(block), corner };
+    const { label, distances, made, geometry } = block;
+    const index = geometry.getIndex()?.array ?? [];
+    const place = { block: this.finest.indexOf(block), vertex: index[corner] ?? 0 };
     if (!distances) return { at: end, label, ...place };
     const point = ray.at(end, new Vector3()).toArray();
-    const corners = [0, 1, 2].map((i) => made.index[corner + i] ?? 0) as [number, number, number];
+    const corners = [0, 1, 2].map((i) => index[corner + i] ?? 0) as [number, number, number];
     const distance = valueWithin(distances, made.positions, corners, point);
     return { at: end, label, distance, ...place };
   }
@@ -323,6 +329,7 @@ export class Parts {
     for (const { materials } of this.looks.values()) for (const made of materials) made.dispose();
     this.usual.dispose();
     this.shader.dispose();
+    this.wires.dispose();
   }
 
   private newLook(part: Part | null): Look {
@@ -334,6 +341,7 @@ export class Parts {
       blocks: 0,
       level: { seams: new Seams(), blocks: 0 },
       copy: [],
+      copyWire: this.wires.add(),
       showsDistance: false,
       opacity: part ? (this.opacities.get(part.label) ?? 1) : 1,
     };
@@ -365,7 +373,8 @@ export class Parts {
       if (isOther) made.needsUpdate = true;
       hasChanged ||= isOther;
       made.flatShading = shading === 'flat';
-      made.wireframe = wireframe;
+      // Edges lie on the surface.
+      made.polygonOffset = wireframe || made.side === BackSide;
       made.opacity = opacity;
       made.transparent = opacity < 1;
       made.depthWrite = opacity === 1;
@@ -382,14 +391,30 @@ export class Parts {
   }
 
   private show(block: DrawnBlock): void {
-    this.showMeshes(block.meshes, block.look, this.isSeen(block));
+    const isSeen = this.isSeen(block);
+    this.showMeshes(block.meshes, block.look, isSeen);
+    if (isSeen && this.style.wireframe && !block.wire) {
+      block.wire = this.wires.add();
+      this.scene.add(block.wire);
+    }
+    if (block.wire) this.showWire(block.wire, block.geometry, block.made.border, isSeen);
+  }
+
+  private showWire(wire: Wire, geometry: BufferGeometry, border: ArrayLike<number>, isSeen: boolean): void {
+    wire.visible = isSeen && this.style.wireframe;
+    if (wire.visible) wire.geometry = this.wires.of(geometry, border);
+  }
+
+  private hide({ meshes, wire }: DrawnBlock): void {
+    for (const mesh of meshes) mesh.visible = false;
+    if (wire) wire.visible = false;
   }
 
   // The back of a closed surface is only seen where it is cut or looked through.
   private showMeshes([front, back]: readonly Drawn[], { opacity }: Look, isSeen: boolean): void {
     if (front) front.visible = isSeen;
     const isThrough = this.style.opacity * opacity < 1;
-    if (back) back.visible = isSeen && (this.planes !== null || isThrough || this.style.wireframe);
+    if (back) back.visible = isSeen && (this.planes !== null || isThrough);
   }
 
   private get isCopySeen(): boolean {
@@ -404,12 +429,17 @@ export class Parts {
 
   private showAll(): void {
     for (const block of this.blocks) this.show(block);
-    for (const look of this.looks.values()) this.showMeshes(look.copy, look, look.isShown && this.isCopySeen);
+    for (const look of this.looks.values()) {
+      const isSeen = look.isShown && this.isCopySeen;
+      this.showMeshes(look.copy, look, isSeen);
+      const geometry = look.copy[0]?.geometry;
+      if (geometry) this.showWire(look.copyWire, geometry, { length: 0 }, isSeen);
+    }
   }
 
-  // Wires are made of a block when it is first drawn with them, so that some blocks at a time turn.
+  // Wires are made of a block when it is first drawn with them, so that some blocks at a time get them.
   private showBySteps(): void {
-    for (const { meshes } of this.blocks) for (const mesh of meshes) mesh.visible = false;
+    for (const { wire } of this.blocks) if (wire) wire.visible = false;
     const step = (from: number): void => {
       for (const block of this.blocks.slice(from, from + wiresPerFrame)) this.show(block);
       this.draw();

@@ -10,8 +10,8 @@ export interface Picked {
   point: Vec3;
   label: Label | null;
   distance?: number; // of a surface that has distances, there
-  // The triangle, as PartFinder.partOf takes it; none of a slice.
-  triangle: [block: number, corner: number] | null;
+  // A vertex of its triangle, as PartFinder.partOf takes it; none of a slice.
+  vertex: [block: number, vertex: number] | null;
 }
 
 const caster = new Raycaster();
@@ -27,7 +27,7 @@ export function pickedAt(x: number, y: number, camera: Camera, parts: Parts, cut
   const found = hit?.at ?? slice;
   if (found === Infinity) return null;
   const point = ray.at(found, new Vector3());
-  const triangle: Picked['triangle'] = hit ? [hit.block, hit.corner] : null;
-  const picked: Picked = { point: [point.x, point.y, point.z], label: hit?.label ?? null, triangle };
+  const vertex: Picked['vertex'] = hit ? [hit.block, hit.vertex] : null;
+  const picked: Picked = { point: [point.x, point.y, point.z], label: hit?.label ?? null, vertex };
   return hit?.distance === undefined ? picked : { ...picked, distance: hit.distance };
 }

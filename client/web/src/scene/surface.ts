@@ -1,16 +1,16 @@
 // A surface in a canvas: blocks of triangles that come one by one, a camera, and what is drawn over them. Draws when something changed.
 import { type Object3D, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
-import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import type { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3, Volume, Label } from '../api/types';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
-import type { PartFinder } from '../mesh/part_finder';
 import { OrientationCube } from './cube';
 import { compile, whenDrawn } from './compile';
+import { Components } from './components';
 import { Cross } from './cross';
 import { Cut } from './cut';
 import { efforts, FrameBudget } from './budget';
-import { addLights, clipTo, facing, panned, verticalAngle } from './camera';
+import { addLights, clipTo, controlsOf, facing, panned, placeOf, verticalAngle } from './camera';
 import { CoarseMaker } from './coarse_maker';
 import type { Reach } from './distances';
 import { Frame, type Manner } from './frame';
@@ -30,11 +30,14 @@ export class Surface {
   readonly canvas: HTMLCanvasElement;
   readonly rulers: Rulers;
   readonly cut: Cut;
+  readonly components: Components;
   private readonly cross: Cross;
   private readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
-  // More blocks can be drawn.
+  // A frame shows more blocks.
   onShown: (() => void) | null = null;
+  // How many triangles of its finest blocks the last frame shows.
+  trianglesShown = 0;
   // A click or tap; null where nothing is.
   onPick: ((picked: Picked | null) => void) | null = null;
 
@@ -77,6 +80,7 @@ export class Surface {
       this.parts.takeCopies(levels);
       if (this.isCoarse) this.draw();
     });
+    this.components = new Components(this.scene, this.parts, this.copies);
     this.frame = new Frame(this.renderer, this.scene, this.camera, this.parts);
     this.renderer.localClippingEnabled = true;
     this.renderer.autoClear = false;
@@ -91,12 +95,7 @@ export class Surface {
     this.cut = new Cut(this.scene);
     this.cross = new Cross(this.scene);
 
-    this.controls = new OrbitControls(this.camera, this.canvas);
-    this.controls.zoomToCursor = true;
-    this.controls.rotateSpeed = 0.9;
-    this.controls.addEventListener('start', () => this.beginMove());
-    this.controls.addEventListener('end', () => this.endMove());
-    this.controls.addEventListener('change', () => this.cameraChanged());
+    this.controls = controlsOf(this.camera, this.canvas, { start: () => this.beginMove(), end: () => this.endMove(), change: () => this.cameraChanged() });
     onTap(this.canvas, (event) => this.tapped(event));
     this.canvas.addEventListener('webglcontextrestored', () => this.draw());
 
@@ -121,11 +120,8 @@ export class Surface {
     const compiling = new AbortController();
     this.compiling = compiling;
     this.isCompiled = false;
-    const scenes: [Object3D, PerspectiveCamera][] = [
-      [this.scene, this.camera],
-      [this.cube.scene, this.cube.camera],
-      [this.frame.painting.enlarging, this.camera],
-    ];
+    const { scene, cube, camera, frame } = this;
+    const scenes: [Object3D, PerspectiveCamera][] = [[scene, camera], [cube.scene, cube.camera], [frame.painting.enlarging, camera]];
     compile(this.renderer, scenes, compiling.signal, () => {
       this.uploading.compile(this.camera, compiling.signal, () => {
         this.isCompiled = true;
@@ -143,7 +139,7 @@ export class Surface {
 
   addBlocks(blocks: Block[], part: Part | null, isCoarse = false): void {
     if (this.parts.add(blocks, part, isCoarse)) this.compile();
-    if (!isCoarse) for (const { coarse } of blocks) this.copies.add(this.parts.numberOf(part?.label ?? null), coarse);
+    if (!isCoarse) for (const block of blocks) this.copies.add(this.parts.numberOf(part?.label ?? null), block);
     delete this.host.dataset.still;
     this.bring();
   }
@@ -154,7 +150,6 @@ export class Surface {
     this.isBusy = true;
     this.isStale = true;
     this.uploading.step(this.camera);
-    this.onShown?.();
     whenDrawn(this.renderer.getContext() as WebGL2RenderingContext, () => this.release(() => this.budget.soon(() => this.draw())));
   }
 
@@ -175,22 +170,12 @@ export class Surface {
     joinSeams(this.parts, this.over.signal, () => this.draw());
   }
 
-  // How many triangles of its finest blocks are drawn.
-  get trianglesShown(): number {
-    return this.parts.trianglesThere;
-  }
-
   // Resolves once all blocks that were added are drawn.
   allShown(): Promise<void> {
     return new Promise((resolve) => {
       this.onAllShown.push(resolve);
       this.draw();
     });
-  }
-
-  // Which triangles belong together. To be asked for once all is there.
-  get partFinder(): PartFinder {
-    return this.parts.finder;
   }
 
   setStyle(style: SurfaceStyle): void {
@@ -220,8 +205,7 @@ export class Surface {
 
   // Turns the camera so that the cut is seen, where it is seen edge-on or from the side that stays.
   faceCut(): void {
-    const { x, y, z } = this.cut.plane.normal;
-    this.moveTo(facing(this.place, [x, y, z]));
+    this.moveTo(facing(this.place, this.cut.plane.normal.toArray()));
   }
 
   // Lines through that sample, along the volume's axes.
@@ -234,6 +218,23 @@ export class Surface {
   mark(places: readonly Vec3[]): void {
     const outwards = this.rulers.marks.show(places, this.bounds);
     if (places.length > 0) this.fit(outwards ?? undefined);
+  }
+
+  // Changes what is drawn, by a coarse copy first where frames take long.
+  change(what: () => void): void {
+    this.beginMove();
+    what();
+    this.draw();
+    this.endMove();
+  }
+
+  // Other blocks in place of those that are there.
+  replace(all: readonly { blocks: Block[]; part: Part | null }[]): void {
+    this.components.mark(null);
+    this.parts.clear();
+    this.copies.restart([]);
+    for (const { blocks, part } of all) this.addBlocks(blocks, part);
+    this.finish();
   }
 
   setHidden(labels: ReadonlySet<Label>): void {
@@ -269,9 +270,7 @@ export class Surface {
   }
 
   get place(): CameraPlace {
-    const { x, y, z } = this.controls.target;
-    const from = this.camera.position;
-    return { offset: [from.x - x, from.y - y, from.z - z], target: [x, y, z] };
+    return placeOf(this.camera, this.controls);
   }
 
   // Moves the camera without telling onCamera: for linked cameras.
@@ -329,8 +328,8 @@ export class Surface {
     cancelAnimationFrame(this.scheduled);
     clearTimeout(this.settling);
     this.resizing.disconnect();
-    const { controls, parts, copies, uploading, rulers, cut, cross, cube, renderer } = this;
-    for (const one of [controls, parts, copies, uploading, this.frame.painting, rulers, cut, cross, cube, renderer]) one?.dispose();
+    const { controls, parts, components, copies, uploading, rulers, cut, cross, cube, renderer } = this;
+    for (const one of [controls, components, parts, copies, uploading, this.frame.painting, rulers, cut, cross, cube, renderer]) one?.dispose();
     // The browser keeps only some contexts; it must not wait for garbage to be collected.
     this.renderer.forceContextLoss();
     this.canvas.remove();
@@ -347,6 +346,7 @@ export class Surface {
     this.isStale = false;
     const began = performance.now();
     const { isCoarse } = this;
+    const there = this.parts.trianglesThere;
     const isNext = this.wasWaiting;
     this.wasWaiting = false;
     const { clientWidth: width, clientHeight: height } = this.host;
@@ -359,12 +359,14 @@ export class Surface {
     this.frame.paint(manner, isOver, after, (isWhole) => {
       // Before the next one begins.
       if (isWhole && !this.isDisposed) this.budget.drawn({ began, isMoving: this.isMoving, isCoarse, isNext });
-      this.release(() => isWhole && this.drawn());
+      this.release(() => isWhole && this.drawn(there));
     });
   }
 
-  private drawn(): void {
+  private drawn(triangles: number): void {
     const { isMoving, budget } = this;
+    if (!this.isCoarse) this.trianglesShown = triangles;
+    this.onShown?.();
     if (budget.isSlow) this.copies.want();
     if (isMoving && budget.isSlow) this.setCoarse(true);
     if (this.isCoarse) this.parts.setLevel(this.levels.indexOf(budget.effort.triangles));
@@ -403,9 +405,7 @@ export class Surface {
   }
 
   private nudge(place: CameraPlace): void {
-    this.beginMove();
-    this.moveTo(place);
-    this.endMove();
+    this.change(() => this.moveTo(place));
   }
 
   private beginMove(): void {
@@ -427,8 +427,7 @@ export class Surface {
 
   private setCoarse(isCoarse: boolean): void {
     if (isCoarse === this.isCoarse) return;
-    this.isCoarse = isCoarse;
-    this.parts.setCoarse(isCoarse);
+    this.parts.setCoarse((this.isCoarse = isCoarse));
     if (isCoarse) this.copies.want();
     this.draw();
   }
@@ -444,7 +443,7 @@ export class Surface {
   // The nearest point of the surface, or of the slice on its cut, that is seen there, in pixels from the upper left corner.
   private pickedAt(x: number, y: number): Picked | null {
     this.setCoarse(false);
-    const { clientWidth, clientHeight } = this.canvas;
-    return pickedAt((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight, this.camera, this.parts, this.cut);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return pickedAt((2 * x) / width - 1, 1 - (2 * y) / height, this.camera, this.parts, this.cut);
   }
 }

@@ -1,27 +1,69 @@
+import type { LoginProvider } from '../api/types';
 import { token, unauthorized } from '../client';
+import { asApiError } from '../api/problem';
 import { button, field, h } from './dom';
+import { beginLogin, findLogin } from './login';
+import { tellError } from './notices';
 import { Signal } from './signal';
 
 // True if the dialog was closed without a token.
 const isDeclined = new Signal<boolean>(false);
 
-// Asks for a token whenever the daemon rejects a request that has none.
+// What the dialog offers.
+interface Ways {
+  provider: LoginProvider | null;
+  hasTokens: boolean;
+  // Why there may be no login now.
+  trouble: string;
+}
+
+async function findWays(): Promise<Ways> {
+  try {
+    const { provider, tokens } = await findLogin();
+    return { provider, hasTokens: tokens || !provider, trouble: '' };
+  } catch (error) {
+    return { provider: null, hasTokens: true, trouble: asApiError(error).detail };
+  }
+}
+
+function dialogTexts({ provider }: Ways): [title: string, text: string] {
+  const isFirst = token.value === '';
+  if (provider) {
+    const text = isFirst ? 'You continue here after the login.' : 'Your login has expired, or this server does not accept it.';
+    return ['This server requires a login', text];
+  }
+  const text = isFirst
+    ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
+    : 'This server does not accept the token. It may have expired.';
+  return ['This server requires a token', text];
+}
+
+function loginButton(provider: LoginProvider): HTMLButtonElement {
+  const go = (): void => {
+    beginLogin(provider).catch(tellError);
+  };
+  return button('Log in', go, { class: 'primary', autofocus: true });
+}
+
+// Asks for a login or a token whenever the daemon rejects a request that has none.
 export function watchToken(onToken: () => void): void {
   let dialog: HTMLDialogElement | null = null;
-  const open = (): void => {
-    if (dialog) return;
+  let isOpening = false;
+  const open = (ways: Ways): void => {
+    const { provider, hasTokens, trouble } = ways;
+    const [title, text] = dialogTexts(ways);
     const input = h('input', { type: 'password', autocomplete: 'off', required: true, name: 'token' });
     const form = h('form', { method: 'dialog' }, [
-      h('h2', 'This server requires a token'),
-      h('p', [
-        token.value === ''
-          ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
-          : 'This server does not accept the token. It may have expired.',
-      ]),
       field('Token', input),
-      h('div.actions', h('button.primary', { type: 'submit' }, 'Continue')),
+      h('div.actions', h(provider ? 'button' : 'button.primary', { type: 'submit' }, 'Continue')),
     ]);
-    const made = h('dialog.dialog', { 'aria-label': 'Token' }, form);
+    const made = h('dialog.dialog', { 'aria-label': provider ? 'Login' : 'Token' }, [
+      h('h2', title),
+      h('p', text),
+      trouble !== '' && h('p', trouble),
+      provider && h('div.actions', loginButton(provider)),
+      hasTokens && form,
+    ]);
     dialog = made;
     form.addEventListener('submit', (event) => {
       event.preventDefault();
@@ -45,12 +87,19 @@ export function watchToken(onToken: () => void): void {
     });
     document.body.append(made);
     made.showModal();
-    input.focus();
+    if (!provider) input.focus();
+  };
+  const findAndOpen = async (): Promise<void> => {
+    if (dialog || isOpening) return;
+    isOpening = true;
+    const ways = await findWays();
+    isOpening = false;
+    open(ways);
   };
   unauthorized.watch((isWanted) => {
     if (!isWanted) return;
     if (isDeclined.value) unauthorized.value = false;
-    else open();
+    else void findAndOpen();
   });
   window.addEventListener('hashchange', () => (isDeclined.value = false));
 }

@@ -113,7 +113,7 @@ TEST(BearerOf, TakesTheSchemeInAnyCase) {
   EXPECT_EQ(bearer_of("bearer   abc "), "abc");
   for (const std::string& other :
        {std::string(), std::string("Bearer"), std::string("Bearer "), std::string("Basic abc"),
-        std::string("Bearerabc"), std::string("abc"), "Bearer " + std::string(600, 'x')}) {
+        std::string("Bearerabc"), std::string("abc"), "Bearer " + std::string(8100, 'x')}) {
     EXPECT_EQ(bearer_of(other), std::nullopt) << other;
   }
 }

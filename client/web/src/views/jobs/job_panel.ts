@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { changeOf, type Change } from '../../job/changes';
 import { labelTitle } from '../../job/labels';
-import { isSameJob, surfaceInWords, variantOf, withGlb, withShownGlb } from '../../job/parameters';
+import { isSameJob, surfaceInWords, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, javascriptSnippet, librarySnippet, pythonSnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
@@ -118,13 +118,10 @@ export function quality({ parameters }: Job, mesh: MeshSummary): HTMLElement {
 }
 
 // Null where the job's error was not measured.
-export function accuracy(job: Job): HTMLElement | null {
+export function accuracy(job: Job, onColour: () => void): HTMLElement | null {
   const body = certificateBody(job);
   if (!body) return null;
-  if (!job.parameters.distances) {
-    const colour = (): void => makeVariant(job)({ distances: true, ...withShownGlb(job.parameters) });
-    body.append(button('Show the distance as colour', colour, { title: 'Starts a job whose GLB file holds the distances' }));
-  }
+  body.append(button('Show the distance as colour', onColour));
   return section('Distance from the scan', body);
 }
 

@@ -14,12 +14,7 @@ type Top = keyof Reach;
 
 export class DistanceLook {
   readonly legend = h('div.legend', { hidden: true, role: 'group', 'aria-label': 'Distance from the scan' });
-  readonly toggle = button('Distance', () => this.set(!this.isOn), {
-    'aria-pressed': 'false',
-    title: 'Colour the surface by its distance from the scan (d)',
-    'data-tool': 'distance',
-    hidden: true,
-  });
+  readonly toggle: HTMLButtonElement;
   isOn = false;
   private reach: Reach | null = null;
   private top: Top = 'p99';
@@ -30,8 +25,14 @@ export class DistanceLook {
   constructor(
     scope: Scope,
     private readonly surface: Surface,
+    onToggle: () => void,
     private readonly onChange: (isOn: boolean) => void,
   ) {
+    this.toggle = button('Distance', onToggle, {
+      'aria-pressed': 'false',
+      title: 'Colour the surface by its distance from the scan, which is measured first if need be (d)',
+      'data-tool': 'distance',
+    });
     const bar = h('div.legend-bar', { 'aria-hidden': 'true' });
     bar.style.backgroundImage = cssGradient();
     const tops = [
@@ -55,7 +56,6 @@ export class DistanceLook {
   // All of the surface is there. Says whether it has distances.
   loaded(): boolean {
     this.reach = this.surface.reach();
-    this.toggle.hidden = this.reach === null;
     this.scale();
     return this.reach !== null;
   }

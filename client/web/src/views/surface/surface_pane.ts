@@ -1,6 +1,9 @@
 // A surface with its tools: what a job made, loaded part by part.
-import { asApiError } from '../../api/problem';
+import { client } from '../../client';
+import { asApiError, errorOfProblem } from '../../api/problem';
 import type { Job, MeshSummary, Vec3, Volume } from '../../api/types';
+import type { Block } from '../../mesh/blocks';
+import type { Part } from '../../mesh/glb';
 import { loadMesh, type LoadProgress, type LoadTiming } from '../../mesh/load';
 import { viewableFile, whyNotShown } from '../../mesh/shown';
 import { surfaceDrawing } from '../../scene/graphics';
@@ -11,18 +14,18 @@ import { viewNames, viewTitles, type CameraPlace } from '../../scene/views';
 import type { LabelState } from '../../job/labels';
 import { withShownGlb } from '../../job/parameters';
 import { emptyReason } from '../../job/empty';
-import { changeLink, fileNameOf, makeVariant } from '../../job/variants';
+import { changeLink, fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, isTyping } from '../../ui/dom';
 import { formatCount, formatSize } from '../../ui/format';
 import { refusal, tell, tellError } from '../../ui/notices';
 import { saveBlob } from '../../ui/save';
 import { Scope } from '../../ui/signal';
 import { cssColour } from '../../ui/theme';
+import { ComponentList } from './component_list';
 import { CutTool } from './cut_tool';
 import { DistanceLook } from './distance_look';
 import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from './look_text';
 import { PickedLabel } from '../labels/picked_label';
-import { PickedPart } from './picked_part';
 import { viewButtons } from './view_tools';
 
 const turnStep = Math.PI / 36;
@@ -56,7 +59,7 @@ export class SurfacePane {
   private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Loading the surface' });
   private readonly announcement = h('div.sr-only', { 'aria-live': 'polite' });
   private readonly pickedLabel: PickedLabel;
-  private readonly pickedPart: PickedPart;
+  readonly components: ComponentList;
   private distance: DistanceLook | null = null;
   private style: SurfaceStyle = defaultStyle;
   private readonly opacity = h('input', {
@@ -70,6 +73,7 @@ export class SurfacePane {
   });
   private wantsDistance = false;
   private isMeasuring = false;
+  private isMeasuringDistances = false;
   // All of it is drawn.
   private isWhole = false;
   private cut: CutTool | null = null;
@@ -81,7 +85,7 @@ export class SurfacePane {
     private readonly options: PaneOptions,
   ) {
     this.pickedLabel = new PickedLabel(scope, options.labels);
-    this.pickedPart = new PickedPart(scope, job, makeVariant(job));
+    this.components = new ComponentList(scope, job, makeVariant(job));
     this.element = h('div.pane', this.view, this.announcement);
     this.view.append(h('div.load', this.bar, this.status));
   }
@@ -103,8 +107,10 @@ export class SurfacePane {
       if (this.scope.isOver) return null;
       surface.finish();
       this.isWhole = true;
+      this.components.loaded(surface);
       // A user who asked for distances wants to see them.
       if (this.distance?.loaded()) this.distance.set(this.options.hasKeys || this.wantsDistance);
+      else if (this.wantsDistance) void this.showDistances();
       this.element.dataset.loaded = 'true';
       this.bar.parentElement?.remove();
       return timing;
@@ -224,10 +230,10 @@ export class SurfacePane {
     surface.onCamera = () => this.onCamera?.(surface.place);
     surface.onPick = (picked) => this.picked(picked, surface);
     this.followLabels(surface);
-    const distance = new DistanceLook(this.scope, surface, (isOn) => this.setStyle({ distance: isOn }));
+    const distance = new DistanceLook(this.scope, surface, () => this.toggleDistance(), (isOn) => this.setStyle({ distance: isOn }));
     this.distance = distance;
     if (this.options.volume) this.cut = new CutTool(this.scope, this.job, this.options.volume, this.options.labels, surface, this.view);
-    const tools = [this.toolbar(surface, distance), this.cut?.element ?? '', this.pickedLabel.element, this.pickedPart.element];
+    const tools = [this.toolbar(surface, distance), this.cut?.element ?? '', this.pickedLabel.element, this.components.picked];
     this.element.append(h('div.tools', ...tools), distance.legend);
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     if (this.options.hasKeys) {
@@ -256,7 +262,7 @@ export class SurfacePane {
   private picked(picked: Picked | null, surface: Surface): void {
     if (!this.isMeasuring) {
       this.options.labels.pick(picked?.label ?? null);
-      this.pickedPart.show(this.isWhole ? picked : null, () => surface.partFinder);
+      void this.components.pick(picked);
       if (picked) this.onPoint?.(picked.point);
       return;
     }
@@ -298,7 +304,7 @@ export class SurfacePane {
       ]),
       h('div.tool-group', [
         this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
-        this.toggle('wireframe', 'Edges', 'Wireframe: show only the edges (w)', () => this.toggleWires()),
+        this.toggle('wireframe', 'Edges', 'Show the edges of the triangles (w)', () => this.toggleWires()),
         distance.toggle,
         h('label.opacity', h('span', 'Opacity'), opacity),
       ]),
@@ -327,14 +333,38 @@ export class SurfacePane {
   }
 
   private toggleDistance(): void {
-    const { distance, job } = this;
-    if (!distance || !this.isWhole) return;
-    if (distance.hasValues) {
-      distance.set(!distance.isOn);
-      return;
+    if (!this.isWhole) return;
+    if (this.distance?.isOn) this.distance.set(false);
+    else void this.showDistances();
+  }
+
+  // Measures them if the file holds none: a job of the same surface does, whose triangles take the place of these. Camera, cut and
+  // measurements stay.
+  async showDistances(): Promise<void> {
+    const { distance, surface, job, scope } = this;
+    if (!distance || !surface || !this.isWhole) return;
+    if (!distance.hasValues) {
+      if (this.isMeasuringDistances) return;
+      this.isMeasuringDistances = true;
+      const load = h('div.load', this.status);
+      this.status.textContent = 'Measuring the distances';
+      this.view.append(load);
+      try {
+        const measured = await client.follow((await submitVariant(job, { distances: true, ...withShownGlb(job.parameters) })).id, scope.signal);
+        if (measured.error) throw errorOfProblem(measured.error);
+        const all: { blocks: Block[]; part: Part | null }[] = [];
+        await loadMesh(measured, scope.signal, { onBlocks: (blocks, part, isCoarse) => isCoarse || all.push({ blocks, part }), onProgress: () => undefined });
+        surface.replace(all);
+        this.components.loaded(surface);
+        distance.loaded();
+      } catch (error) {
+        if (!scope.isOver) tellError(error);
+      } finally {
+        this.isMeasuringDistances = false;
+        load.remove();
+      }
     }
-    const make = (): void => makeVariant(job)({ distances: true, ...withShownGlb(job.parameters) });
-    tell(h('span', 'The file of this surface holds no distances. ', button('Make one that does', make, { class: 'link' })));
+    if (!scope.isOver) distance.set(true);
   }
 
   private toggleCut(): void {

@@ -33,6 +33,17 @@ export function rejected(outcome: Outcome, choices: Choices, error: ApiError): O
   return { ...outcome, choices, error, asked: openQuestion(error, choices, outcome.asked) };
 }
 
+// True if the volumes may be masks of one structure each: of one size, each 0 and another whole number, or empty.
+export function mayBeMasks(outcomes: readonly Outcome[]): boolean {
+  const volumes = outcomes.flatMap(({ volume }) => volume ?? []);
+  const [first] = volumes;
+  if (!first || volumes.length < 2 || volumes.length < outcomes.length) return false;
+  return volumes.every(
+    ({ dims, range: [low, high], notes }) =>
+      low === 0 && (high === 0 || notes.some(({ code }) => code === 'looks-like-labels')) && dims.every((size, axis) => size === first.dims[axis]),
+  );
+}
+
 function storedRow(volume: Volume, wasThere: boolean): Node[] {
   return [
     h('a', { href: hashOf(['volumes', volume.id]) }, volumeName(volume)),

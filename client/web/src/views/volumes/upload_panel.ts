@@ -11,7 +11,7 @@ import { filesOfDrop, filesOfList, gather, type Gathered } from '../../volume/ga
 import { noteTexts, skippedText, volumeName } from '../../volume/names';
 import { faultOf } from '../../volume/sniff';
 import type { NamedFile } from '../../volume/tar';
-import { outcomeList, outcomeOf, rejected, type Outcome } from './outcomes';
+import { mayBeMasks, outcomeList, outcomeOf, rejected, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
 import { acceptButton, choiceLists, openQuestion, questionOf, seriesOf, unread, type Asked, type Choices } from './remedies';
 import { UploadProgress } from './upload_progress';
@@ -339,6 +339,7 @@ export class UploadPanel {
     this.body.replaceChildren(
       h('h2', { role: 'status' }, `${stored} of ${count} volumes in the upload were stored`),
       outcomeList(outcomes, gathered, ({ asked }, choices, ...next) => void this.send(gathered, { choices, asked, outcomes, next })),
+      ...(mayBeMasks(outcomes) ? [this.masksQuestion(gathered)] : []),
       h('div.actions', button('Upload another', () => {
         this.showIdle();
         this.goOn();
@@ -347,6 +348,11 @@ export class UploadPanel {
     this.reveal();
     this.onStored?.();
     if (stored === count) this.goOn();
+  }
+
+  private masksQuestion(gathered: Gathered): HTMLElement {
+    const together = (): void => void this.send(gathered, { choices: { masks: 'true' } });
+    return h('div.stack', h('p', 'Are these masks of one structure each?'), h('div.actions', button('One surface each, together', together)));
   }
 
   private showUnusable(error: ApiError): void {

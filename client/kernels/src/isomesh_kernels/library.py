@@ -1,0 +1,134 @@
+"""The compiled library, as kernels.cpp declares it: runs that make one mesh each."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Tuple
+
+import numpy
+
+if TYPE_CHECKING:
+    from isomesh_client import Raw
+
+_LOOK_MS = 50  # between two looks at a run: so long an interrupt may wait
+
+
+class _Volume(ctypes.Structure):
+    _fields_ = [
+        ("samples", ctypes.c_void_p),
+        ("type", ctypes.c_char_p),
+        ("dims", ctypes.c_uint32 * 3),
+        ("origin", ctypes.c_double * 3),
+        ("spacing", ctypes.c_double * 3),
+        ("direction", ctypes.c_double * 9),
+        ("left_out", ctypes.c_uint64),
+        ("memory_bytes", ctypes.c_uint64),
+        ("is_ct", ctypes.c_int32),
+    ]
+
+
+class _Made(ctypes.Structure):
+    _fields_ = [
+        ("vertices", ctypes.c_void_p),
+        ("triangles", ctypes.c_void_p),
+        ("labels", ctypes.c_void_p),
+        ("colors", ctypes.c_void_p),
+        ("vertex_count", ctypes.c_uint64),
+        ("triangle_count", ctypes.c_uint64),
+        ("job", ctypes.c_char_p),
+        ("error", ctypes.c_char_p),
+        ("kind", ctypes.c_char_p),
+    ]
+
+
+def _loaded() -> Any:
+    path = Path(__file__).with_name("_kernels.so")
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise ImportError(
+            f"isomesh_kernels cannot load its library: {error}. Install the wheel for this machine, "
+            "or the folder python of a build with -D ISOMESH_PYTHON=ON"
+        ) from error
+    run = ctypes.c_void_p
+    library.isomesh_start.argtypes, library.isomesh_start.restype = [ctypes.POINTER(_Volume), ctypes.c_char_p], run
+    library.isomesh_wait.argtypes = [run, ctypes.c_int32, ctypes.POINTER(ctypes.c_double)]
+    library.isomesh_wait.restype = ctypes.c_bool
+    library.isomesh_result.argtypes, library.isomesh_result.restype = [run], _Made
+    library.isomesh_free.argtypes, library.isomesh_free.restype = [run], None
+    library.isomesh_set_threads.argtypes, library.isomesh_set_threads.restype = [ctypes.c_int32], None
+    return library
+
+
+_library = _loaded()
+
+
+class Run:
+    """A mesh that is made. ctypes lets other threads of Python run during every call."""
+
+    def __init__(
+        self, samples: Any, raw: Raw, left_out: int, is_ct: bool, memory_bytes: int, parameters: Mapping[str, Any]
+    ) -> None:
+        volume = _Volume(
+            samples.ctypes.data,
+            raw.type.encode(),
+            (ctypes.c_uint32 * 3)(*raw.dims),
+            (ctypes.c_double * 3)(*raw.origin),
+            (ctypes.c_double * 3)(*raw.spacing),
+            (ctypes.c_double * 9)(*raw.direction),
+            left_out,
+            memory_bytes,
+            is_ct,
+        )
+        self._run = _library.isomesh_start(ctypes.byref(volume), json.dumps(parameters).encode())
+        if not self._run:
+            raise MemoryError("there is no memory or no thread for a mesh")
+        # The samples have to stay until the run has ended, however this object ends.
+        self._held = [samples]
+        self._free = weakref.finalize(self, _freed, self._run, self._held)
+
+    def wait(self, progress: Optional[Callable[[float], object]]) -> _Made:
+        """Waits for the end. An interrupt, or an exception of `progress`, cancels the run."""
+        share, told = ctypes.c_double(), -1.0
+        try:
+            while not _library.isomesh_wait(self._run, _LOOK_MS, ctypes.byref(share)):
+                if progress is not None and share.value != told:
+                    told = share.value
+                    progress(told)
+        except BaseException:
+            self._free()
+            raise
+        self._held.clear()
+        made: _Made = _library.isomesh_result(self._run)
+        if made.error is None and progress is not None:
+            progress(1.0)
+        return made
+
+    def array(self, address: Optional[int], count: int, kind: str, columns: int) -> Any:
+        """An array in the memory of the run, which lives as long as the array."""
+        shape: Tuple[int, ...] = (count, columns) if columns > 1 else (count,)
+        if not count or not address:
+            return numpy.empty(shape, kind)
+        size = count * columns * numpy.dtype(kind).itemsize
+        memory: Any = (ctypes.c_char * size).from_address(address)
+        memory.owner = self
+        return numpy.frombuffer(memory, kind).reshape(shape)
+
+
+def _freed(run: int, _held: Any) -> None:
+    _library.isomesh_free(run)
+
+
+def set_threads(threads: int) -> None:
+    """How many threads all meshes share. Default: the number of processors. Call it while none is made."""
+    if threads < 1:
+        raise ValueError(f"threads must be at least 1, not {threads}")
+    _library.isomesh_set_threads(threads)
+
+
+def physical_bytes() -> int:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

@@ -1,0 +1,240 @@
+"""`isomesh mcp`, by a client that speaks the protocol line by line."""
+
+import base64
+import json
+import os
+import signal
+import socket
+import subprocess
+import time
+import unittest
+from pathlib import Path
+
+import isomesh_client
+from isomesh_client.api import JobOptions
+from support import DAEMON, DaemonTest, ball
+
+COMMAND = Path(DAEMON).with_name("isomesh")
+
+
+class Session:
+    """A client of the protocol. `ask` returns the response, `call` the result of a tool."""
+
+    def __init__(self, url, folder):
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("ISOMESH")}
+        command = [COMMAND, "--server", url, "--retry-seconds", "0", "mcp", "--folder", folder]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
+        self.number = 0
+        self.notifications = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        self.status = self.process.wait(60)
+        self.process.stdout.close()
+
+    def write(self, line):
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def read(self):
+        return json.loads(self.process.stdout.readline())
+
+    def send(self, method, **params):
+        self.number += 1
+        self.write(json.dumps({"jsonrpc": "2.0", "id": self.number, "method": method, "params": params}))
+        return self.number
+
+    def notify(self, method, **params):
+        self.write(json.dumps({"jsonrpc": "2.0", "method": method, "params": params}))
+
+    def ask(self, method, **params):
+        number = self.send(method, **params)
+        while "id" not in (message := self.read()):
+            self.notifications.append(message)
+        assert message["id"] == number, message
+        return message
+
+    def call(self, tool, **arguments):
+        return self.ask("tools/call", name=tool, arguments=arguments)["result"]
+
+
+class Mcp(DaemonTest):
+    def setUp(self):
+        self.place = self.folder / self._testMethodName
+        self.place.mkdir()
+        (self.place / "ball.raw").write_bytes(ball().tobytes(order="F"))
+        (self.place / "ball.mhd").write_text(
+            "ObjectType = Image\nNDims = 3\nDimSize = 40 32 24\nElementSpacing = 1 1 1\nElementType = MET_FLOAT\n"
+            "ElementByteOrderMSB = False\nElementDataFile = ball.raw\n"
+        )
+
+    def session(self):
+        return Session(self.url, self.place)
+
+    def test_from_a_file_to_a_mesh(self):
+        with self.session() as client:
+            begun = client.ask("initialize", protocolVersion="2025-06-18", capabilities={}, clientInfo={"name": "test"})
+            self.assertEqual(begun["result"]["protocolVersion"], "2025-06-18")
+            self.assertEqual(set(begun["result"]["capabilities"]), {"tools", "resources"})
+            client.notify("notifications/initialized")
+            volume = client.call("upload", files=["ball.mhd"])["structuredContent"]
+            self.assertEqual(volume["dims"], [40, 32, 24])
+            self.assertEqual(client.call("info", volume=volume["id"])["structuredContent"]["range"], volume["range"])
+            listed = client.call("volumes")["structuredContent"]["volumes"]
+            self.assertIn(volume["id"], [each["id"] for each in listed])
+            iso = volume["suggested_iso"]
+            made = client.call("mesh", volume=volume["id"], parameters={"iso": iso, "passes": 0}, output=["ball.stl"])
+            self.assertFalse(made["isError"])
+            job = made["structuredContent"]
+            size = 84 + 50 * job["mesh"]["triangles"]
+            self.assertEqual((self.place / "ball.stl").stat().st_size, size)
+            link = made["content"][1]
+            self.assertEqual((link["type"], link["mimeType"], link["size"]), ("resource_link", "model/stl", size))
+            self.assertEqual(json.loads(made["content"][0]["text"]), job)
+            # The mesh as a resource.
+            resources = client.ask("resources/list")["result"]["resources"]
+            self.assertIn(link["uri"], [each["uri"] for each in resources])
+            (content,) = client.ask("resources/read", uri=link["uri"])["result"]["contents"]
+            self.assertEqual(base64.b64decode(content["blob"]), (self.place / "ball.stl").read_bytes())
+            self.assertEqual(client.ask("resources/read", uri="isomesh://jobs/no/mesh.stl")["error"]["code"], -32002)
+            jobs = client.call("jobs", volume=volume["id"])["structuredContent"]["jobs"]
+            self.assertEqual([each["id"] for each in jobs], [job["id"]])
+            files = client.call("fetch", job=job["id"], output=["again.stl"])["structuredContent"]["files"]
+            self.assertEqual(files, [{"file": "again.stl", "bytes": size}])
+        self.assertEqual(client.status, 0)
+
+    def test_labels_and_masks(self):
+        folder = self.place / "masks"
+        folder.mkdir()
+        for name, planes in (("low", 8), ("high", 16)):
+            (folder / f"{name}.raw").write_bytes(bytes(int(z < planes) for z in range(24) for _ in range(40 * 32)))
+            text = (self.place / "ball.mhd").read_text().replace("ball.raw", f"{name}.raw")
+            (folder / f"{name}.mhd").write_text(text.replace("MET_FLOAT", "MET_UCHAR"))
+        with self.session() as client:
+            made = client.call("mesh", files=["masks"], masks=True, output=["all.glb"])["structuredContent"]
+            names = [each["name"] for each in client.call("labels", job=made["id"])["structuredContent"]["labels"]]
+            self.assertEqual(names, ["high", "low"])
+            of_volume = client.call("labels", volume=made["volume"])["structuredContent"]["labels"]
+            self.assertEqual([each["name"] for each in of_volume], names)
+            self.assertEqual((self.place / "all.glb").read_bytes()[:4], b"glTF")
+
+    def test_schemas_come_from_the_table_of_parameters(self):
+        with self.session() as client:
+            tools = {each["name"]: each for each in client.ask("tools/list")["result"]["tools"]}
+        self.assertEqual(set(tools), {"upload", "volumes", "info", "mesh", "labels", "jobs", "cancel", "fetch"})
+        parameters = tools["mesh"]["inputSchema"]["properties"]["parameters"]["properties"]
+        self.assertEqual(parameters["passes"]["type"], "integer")
+        self.assertEqual(parameters["passes"]["maximum"], 1000)
+        self.assertIn("taubin", parameters["smoothing"]["enum"])
+        self.assertEqual(parameters["draco"]["properties"]["speed"]["maximum"], 10)
+        self.assertEqual({*parameters, "formats", "callback"}, {each.rstrip("_") for each in JobOptions.__annotations__})
+        self.assertFalse({"volume", "formats", "callback"} & set(parameters))
+
+    def test_wrong_calls_say_what_helps(self):
+        with self.session() as client:
+            for arguments, told in (
+                ({"files": ["nothing.nii"]}, "nothing.nii"),
+                ({"files": ["../secret"]}, "is not in the folder"),
+                ({"files": ["/etc/passwd"]}, "is not in the folder"),
+                ({"files": "ball.mhd"}, "files: has the wrong type"),
+                ({}, "files: must name a file"),
+                ({"files": ["ball.mhd"], "parameters": {"pases": 1}}, "pases"),
+                ({"files": ["ball.mhd"], "parameters": {"iso": 1, "passes": 2000}}, "passes"),
+                ({"files": ["ball.mhd"], "file": 1}, "file: is no argument of mesh"),
+                ({"files": ["ball.mhd"], "output": ["ball.raw"], "parameters": {"iso": 1}}, "format"),
+                ({"files": ["ball.mhd"], "output": ["../ball.stl"], "parameters": {"iso": 1}}, "is not in the folder"),
+            ):
+                arguments = {"parameters": {"iso": 1}, **arguments}
+                result = client.call("mesh", **arguments)
+                self.assertTrue(result["isError"], arguments)
+                self.assertIn(told, result["content"][0]["text"])
+            (self.place / "there.stl").write_text("mine")
+            again = client.call("mesh", files=["ball.mhd"], parameters={"iso": 1}, output=["there.stl"])
+            self.assertIn("exists already", again["content"][0]["text"])
+            self.assertEqual((self.place / "there.stl").read_text(), "mine")
+
+    def test_lines_that_are_no_requests(self):
+        with self.session() as client:
+            for line, code in (
+                ("no JSON", -32700),
+                ('{"jsonrpc": "2.0", "id": 1, "method": "ping"', -32700),
+                ("[]", -32600),
+                ('[{"jsonrpc": "2.0", "id": 1, "method": "ping"}]', -32600),
+                ('{"id": 1, "method": "ping"}', -32600),
+                ('{"jsonrpc": "2.0", "id": null, "method": "ping"}', -32600),
+                ('{"jsonrpc": "2.0", "id": {}, "method": "ping"}', -32600),
+                ('{"jsonrpc": "2.0", "id": 1}', -32600),
+                ('{"jsonrpc": "2.0", "id": 1, "method": 5}', -32602),
+                ('{"jsonrpc": "2.0", "id": 1, "method": "ping", "params": []}', -32602),
+                ('{"jsonrpc": "2.0", "id": 1, "method": "sampling/createMessage"}', -32601),
+                ('{"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": {"name": "rm"}}', -32602),
+                ('{"jsonrpc": "2.0", "id": 1, "method": "resources/read", "params": {"uri": 1}}', -32602),
+                ("[" * 100000, -32700),
+                ('"' + "x" * (1 << 20), -32600),
+            ):
+                client.write(line)
+                response = client.read()
+                self.assertEqual(response.get("error", {}).get("code"), code, line[:80])
+            # Notifications and responses get no answer.
+            client.notify("notifications/initialized")
+            client.notify("no/such/thing")
+            client.write('{"jsonrpc": "2.0", "id": 7, "result": {}}')
+            client.write("")
+            self.assertEqual(client.ask("ping")["result"], {})
+            old = client.ask("initialize", protocolVersion="1999-01-01")["result"]["protocolVersion"]
+            self.assertEqual(old, "2025-06-18")
+
+    def test_a_cancelled_call_cancels_its_job(self):
+        volume = self.client.upload(ball((160, 160, 160), radius=70.0))["id"]
+        with self.session() as client:
+            arguments = {"volume": volume, "parameters": {"iso": 1, "passes": 1000}}
+            number = client.send("tools/call", name="mesh", arguments=arguments)
+            while not (jobs := list(self.client.jobs(volume=volume))):
+                time.sleep(0.01)
+            client.notify("notifications/cancelled", requestId=number)
+            self.assertEqual(client.ask("ping")["result"], {})  # the next message: a cancelled request gets none
+            self.assertFalse(client.call("volumes")["isError"])
+        with self.assertRaises(isomesh_client.JobFailed):
+            self.client.wait(jobs[0])
+        self.assertEqual(self.client.job(jobs[0])["state"], "cancelled")
+
+    def test_a_call_that_waits_for_a_silent_server_is_cancelled(self):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            with Session(f"http://127.0.0.1:{silent.getsockname()[1]}", self.place) as client:
+                numbers = [client.send("tools/call", name="volumes", arguments={}) for _ in range(2)]
+                self.assertEqual(client.ask("ping")["result"], {})
+                for number in reversed(numbers):
+                    client.notify("notifications/cancelled", requestId=number)
+                self.assertIn("is empty", client.call("info", volume="")["content"][0]["text"])
+
+    def test_progress_is_told_to_whom_asks(self):
+        with self.session() as client:
+            arguments = {"files": ["ball.mhd"], "parameters": {"iso": 1, "passes": 3}}
+            client.ask("tools/call", name="mesh", arguments=arguments, _meta={"progressToken": 5})
+        told = [each["params"] for each in client.notifications]
+        self.assertTrue(told)
+        self.assertTrue(all(each["progressToken"] == 5 and 0 <= each["progress"] <= 1 for each in told))
+        self.assertEqual([each["progress"] for each in told], sorted({each["progress"] for each in told}))
+
+    def test_a_signal_ends_it(self):
+        client = self.session()
+        client.ask("ping")
+        client.process.send_signal(signal.SIGTERM)
+        self.assertEqual(client.process.wait(30), -signal.SIGTERM)
+        client.process.stdin.close()
+        client.process.stdout.close()
+
+    def test_no_server(self):
+        with Session("http://127.0.0.1:1", self.place) as client:
+            result = client.call("volumes")
+            self.assertTrue(result["isError"])
+            self.assertEqual(client.ask("ping")["result"], {})
+
+
+if __name__ == "__main__":
+    unittest.main()
