@@ -1,4 +1,4 @@
-# A bare Debian in a folder, for tests that must not see this machine's packages. Needs root, debootstrap and the network.
+# A bare Debian in a folder, for releases and for tests, which must not see this machine's packages. Needs root, debootstrap and the network.
 # Sourced by scripts that set `root` to the checkout and define fail().
 
 # make_debian SUITE FOLDER: debootstrap's smallest Debian, a copy of build/debian/SUITE, which is made the first time.
@@ -30,8 +30,28 @@ make_debian() {
   chmod +x "$there/usr/sbin/policy-rc.d"
 }
 
+# share_compiler_cache FOLDER SOURCES: this machine's compiler cache in there, for a checkout at SOURCES. Sets `cached`, the
+# environment of a build that takes it.
+share_compiler_cache() {
+  local there="$1" cache="${CCACHE_DIR:-$HOME/.cache/ccache}" name
+  # ccache comes with its own libraries and loader: the Debian in there must not have a package more than a new user's.
+  mkdir -p "$there/opt/ccache/cache" "$cache"
+  cp /usr/bin/ccache "$there/opt/ccache/"
+  ldd /usr/bin/ccache | grep -o '/[^ ]*' | xargs cp -L -t "$there/opt/ccache/"
+  printf '#!/bin/sh\nexec /opt/ccache/ld-linux-x86-64.so.2 --library-path /opt/ccache /opt/ccache/ccache "$@"\n' >"$there/opt/ccache/launch"
+  chmod +x "$there/opt/ccache/launch"
+  mount --bind "$cache" "$there/opt/ccache/cache"
+  cached=(CMAKE_CXX_COMPILER_LAUNCHER=/opt/ccache/launch CCACHE_DIR=/opt/ccache/cache CCACHE_BASEDIR="$2" CCACHE_NOHASHDIR=1
+    CCACHE_SLOPPINESS=pch_defines,time_macros)
+  # The locale is part of the keys, too.
+  for name in LANG LC_ALL LC_CTYPE LC_MESSAGES; do
+    cached=(-u "$name" "${cached[@]}" ${!name:+"$name=${!name}"})
+  done
+}
+
 # remove_debian FOLDER: also what make_debian did not finish.
 remove_debian() {
+  ! mountpoint --quiet "$1/opt/ccache/cache" || umount --lazy "$1/opt/ccache/cache"
   # Also if a process in there is still ending.
   ! mountpoint --quiet "$1/proc" || umount --lazy "$1/proc"
   rm -rf --one-file-system "$1"
