@@ -1,8 +1,8 @@
 # What each component is made of, for what, and the licences of others in it, beside its documents. Told by ninja, so it is
 # made when a build is installed; on other systems than Debian there is none.
 find_program(ISOMESH_DPKG_QUERY dpkg-query)
-find_program(ISOMESH_PYTHON python3)
-if(NOT ISOMESH_DPKG_QUERY OR NOT ISOMESH_PYTHON OR NOT CMAKE_GENERATOR STREQUAL "Ninja")
+find_program(ISOMESH_PYTHON3 python3)
+if(NOT ISOMESH_DPKG_QUERY OR NOT ISOMESH_PYTHON3 OR NOT CMAKE_GENERATOR STREQUAL "Ninja")
   message(STATUS "No SBOM: that takes Debian, Ninja and python3.")
   return()
 endif()
@@ -17,7 +17,7 @@ function(isomesh_sbom component package)
   endif()
   list(JOIN targets " " targets)
   set(into ${PROJECT_BINARY_DIR}/sbom/${package})
-  install(CODE "execute_process(COMMAND \"${ISOMESH_PYTHON}\" \"${PROJECT_SOURCE_DIR}/server/install/sbom\"
+  install(CODE "execute_process(COMMAND \"${ISOMESH_PYTHON3}\" \"${PROJECT_SOURCE_DIR}/server/install/sbom\"
     --build \"${PROJECT_BINARY_DIR}\" ${page} --version ${PROJECT_VERSION} --into \"${into}\" ${package} ${targets}
     COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${component})
   set(soup ${into}/soup.md)

@@ -18,7 +18,7 @@ import numpy
 from limits import LimitedTest
 from support import DAEMON, DaemonTest, ball, turned
 
-BUILT = Path(os.environ.get("ISOMESH_PYTHON", DAEMON.parent.parent / "python"))
+BUILT = Path(os.environ.get("ISOMESH_KERNELS", DAEMON.parent.parent / "python"))
 if not (BUILT / "src" / "isomesh_kernels" / "_kernels.so").exists():
     raise SystemExit(f"{BUILT} has no isomesh_kernels: cmake --build --preset tests --target isomesh_python")
 sys.path.insert(0, str(BUILT / "src"))

@@ -52,7 +52,7 @@ def _loaded() -> Any:
     except OSError as error:
         raise ImportError(
             f"isomesh_kernels cannot load its library: {error}. Install the wheel for this machine, "
-            "or the folder python of a build with -D ISOMESH_PYTHON=ON"
+            "or the folder python of a build with -D ISOMESH_KERNELS=ON"
         ) from error
     run = ctypes.c_void_p
     library.isomesh_start.argtypes, library.isomesh_start.restype = [ctypes.POINTER(_Volume), ctypes.c_char_p], run
