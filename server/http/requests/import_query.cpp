@@ -219,10 +219,10 @@ std::string plain_file_name(std::string_view name) {
   return plain_name(folder == std::string_view::npos ? name : name.substr(folder + 1));
 }
 
-import::UploadName upload_name_of(std::string_view content_disposition){
-    const std::string chosen = plain_name(text_parameter(content_disposition, "name"));
-if (!chosen.empty()) return {volume::normalized(chosen), true};
-return {plain_file_name(text_parameter(content_disposition, "filename"))};
-}  // namespace isomesh::http
+isomesh::import::UploadName upload_name_of(std::string_view content_disposition) {
+  const std::string chosen = plain_name(text_parameter(content_disposition, "name"));
+  if (!chosen.empty()) return {volume::normalized(chosen), true};
+  return {plain_file_name(text_parameter(content_disposition, "filename"))};
+}
 
 }  // namespace isomesh::http
