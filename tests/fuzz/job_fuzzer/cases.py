@@ -188,7 +188,7 @@ class Runner:
         until = time.monotonic() + most_s
         while job["state"] in ("queued", "running") and time.monotonic() < until:
             _, job = self.ask_json("GET", f"/v1/jobs/{job['id']}?wait=30")
-        return self.check_job(job)
+        return self.check_job(case, job)
 
     def check_names(self, case, problem):
         """A wrong member is named."""
@@ -211,13 +211,13 @@ class Runner:
         job_path = headers["Location"]
         self.remember(case, job_path)
         _, job = self.ask_json("GET", job_path)
-        return self.check_job(job, {case.body.get("formats", ["drc"])[0]: answer})
+        return self.check_job(case, job, {case.body.get("formats", ["drc"])[0]: answer})
 
     def remember(self, case, path):
         if path:
             self.jobs[path.rsplit("/", 1)[-1]] = case.number
 
-    def check_job(self, job, read=()):
+    def check_job(self, case, job, read=()):
         """A job that has succeeded, with its files, or failed with a reason. `read` has files that are there already."""
         what = f"job {job['id']}"
         if job["state"] == "failed":
@@ -234,7 +234,7 @@ class Runner:
         slowness = others_load()
         if taken > slowness * (JOB_MS + JOB_MS_OF_A_THOUSAND * thousands) or certify > slowness * (STAGE_MS + CERTIFY_MS_OF_A_THOUSAND * thousands):
             raise Bad(f"{what} took too long for {thousands} thousand triangles: {job['timing']}")
-        Files(self, job).check(dict(read))
+        Files(self, job, case.volume).check(dict(read))
         return [f"succeeded {name}" for name in mesh["files"]] + (["succeeded without a triangle"] if mesh["empty"] else [])
 
 
@@ -266,8 +266,9 @@ def shorten(runner, case, error):
 class Files:
     """The files of one job, against what the job tells of them."""
 
-    def __init__(self, runner, job):
+    def __init__(self, runner, job, volume):
         self.runner = runner
+        self.volume = volume
         self.job = job
         self.mesh = job["mesh"]
         self.bounds = numpy.array(self.mesh["bounds"], float)
@@ -317,11 +318,12 @@ class Files:
 
     def tolerance(self, name):
         """How far a file's points may lie outside the bounds: by its rounding."""
-        size = float(numpy.max(self.bounds[1] - self.bounds[0]))
         rounding = float(numpy.max(numpy.abs(self.bounds))) * 2.0**-21
         if name not in ("drc", "glb") or self.is_exact(name):
             return rounding
         bits = self.job["parameters"]["draco"]["position_bits"]
+        # The grid is a cube around the cells that the surface crosses: at most the volume, and two and a half samples more on each side.
+        size = float(numpy.linalg.norm((numpy.array(self.volume.dims) + 5) * self.volume.spacing))
         # With max_error_mm the job chooses the bits.
         return rounding + size / 2 ** (7 if self.job["parameters"].get("max_error_mm") is not None else bits)
 
