@@ -26,6 +26,7 @@
 #include "client/cli/uploads.h"
 #include "client/isomesh/package.h"
 #include "proto/json.h"
+#include "proto/notes.h"
 
 namespace isomesh::cli {
 namespace {
@@ -63,6 +64,18 @@ Error overwriting(const OutputNames& names, const std::string& member) {
   return Error(ErrorCode::kInvalidParameter,
                "two meshes would be called " + names.name + ": --member takes one of the volumes")
       .with_remedy({.choices = {{"member", member, ""}}});
+}
+
+// One volume is needed. Several that look like labels may be the masks of one scan.
+Error one_of(const std::vector<UploadedVolume>& volumes) {
+  const Error error = several_volumes(volumes);
+  const std::string_view advice = describe(NoteCode::kLooksLikeLabels).name;
+  const bool are_labels = std::ranges::all_of(volumes, [&](const UploadedVolume& each) {
+    return each.volume && std::ranges::count(each.volume->notes, advice, &Note::code) > 0;
+  });
+  if (!are_labels) return error;
+  return error.with_detail(std::string(error.what()) +
+                           "; if they are masks, --masks makes one surface of each in one mesh");
 }
 
 // Writes to standard output. Thread safe.
@@ -164,7 +177,7 @@ int MeshRun::input(const Input& input) {
   seen_.upload = milliseconds_since(uploading);
   if (options_.dry_run) leftovers_.add(volumes);
   if (volumes.size() == 1 && volumes.front().volume) return mesh(*volumes.front().volume, task);
-  if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
+  if (!is_by_name(options_.outputs)) throw one_of(volumes);
   return members(input, volumes);
 }
 

@@ -64,14 +64,18 @@ class LabelsTest : public testing::Test {
   const Volume volume_ = upload(daemon_, balls_);
 };
 
+// A mask of a cube of 2 x 2 x 2 samples, as NRRD; `inside` is their value.
+std::string mask_nrrd(char inside = '\1') {
+  std::string samples(1000, '\0');
+  for (const std::size_t at : {444, 445, 454, 455, 544, 545, 554, 555}) samples[at] = inside;
+  return "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 10 10 10\nspacings: 1 1 1\nencoding: "
+         "raw\n\n" +
+         samples;
+}
+
 TEST_F(LabelsTest, AMaskAtAnIsoValueIsAdvisedToUseLabels) {
   const TemporaryFolder folder;
-  std::string samples(1000, '\0');
-  for (const std::size_t at : {444, 445, 454, 455, 544, 545, 554, 555}) samples[at] = '\1';
-  write_file(folder / "mask.nrrd",
-             "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 10 10 10\nspacings: 1 1 1\n"
-             "encoding: raw\n\n" +
-                 samples);
+  write_file(folder / "mask.nrrd", mask_nrrd());
   const Finished made =
       daemon_.command({"mesh", folder / "mask.nrrd", "--iso", "0.5", "-o", folder / "mask.glb"});
   EXPECT_EQ(made.status, 0) << made.errors;
@@ -83,6 +87,20 @@ TEST_F(LabelsTest, AMaskAtAnIsoValueIsAdvisedToUseLabels) {
       {"mesh", folder / "mask.nrrd", "--labels", "all", "--close", "-o", folder / "mask.glb"});
   EXPECT_EQ(followed.status, 0) << followed.errors;
   EXPECT_EQ(followed.errors.find("looks-like-labels"), std::string::npos) << followed.errors;
+}
+
+TEST_F(LabelsTest, AFolderOfMasksIsAdvisedToBeOneVolume) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "masks");
+  write_file(folder / "masks/left.nrrd", mask_nrrd());
+  write_file(folder / "masks/right.nrrd", mask_nrrd('\2'));
+  const Finished refused = daemon_.command(
+      {"mesh", folder / "masks", "--labels", "all", "--close", "-o", folder / "mask.glb"});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("if they are masks, --masks makes one surface of each"));
+  const Finished made =
+      daemon_.command({"mesh", folder / "masks", "--masks", "--close", "-o", folder / "mask.glb"});
+  EXPECT_EQ(made.status, 0) << made.errors;
 }
 
 TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {
