@@ -16,6 +16,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 inspect.getargspec = inspect.getfullargspec
 PLUGIN, SERVER, VOLUME, LABELS = sys.argv[1:]
 simple.LoadPlugin(PLUGIN, remote=False, ns=globals())
+import isomesh_client  # noqa: E402  where the plugin found it
 
 
 def told(source):
@@ -34,11 +35,27 @@ def told(source):
     }
 
 
+uploads = []
+upload = isomesh_client.Client.upload
+
+
+def counted(*given, **named):
+    uploads.append(given)
+    return upload(*given, **named)
+
+
+isomesh_client.Client.upload = counted
 result = {}
 reader = isomeshReader(FileName=VOLUME, Server=SERVER, IsoValue="-9")  # noqa: F821
 result["reader"] = told(reader)
 reader.LargestError, reader.Distances = 0.2, 1
 result["simplified"] = told(reader)
+result["uploads"] = len(uploads)
+for volume in list(isomesh_client.Client(SERVER).volumes()):
+    isomesh_client.Client(SERVER).erase(volume, jobs=True)
+reader.Distances = 0
+result["uploaded again"] = told(reader)
+result["all uploads"] = len(uploads)
 result["labels"] = told(isomeshReader(FileName=LABELS, Server=SERVER, Labels="all", Distances=1))  # noqa: F821
 result["one label"] = told(isomeshReader(FileName=LABELS, Server=SERVER, Labels="2"))  # noqa: F821
 result["no server"] = told(isomeshReader(FileName=VOLUME, Server="http://127.0.0.1:9", IsoValue="-9"))  # noqa: F821

@@ -41,6 +41,10 @@ class ParaView(DaemonTest):
         self.assertEqual(count, len(simple.vertices))
         self.assertTrue(0 < most <= 0.2, most)
 
+        # A volume that is stored is not sent again, unless the daemon has removed it.
+        self.assertEqual((seen["uploads"], seen["all uploads"]), (1, 2))
+        self.assertEqual(self.counts(seen["uploaded again"]), (len(simple.vertices), len(simple.faces), []))
+
         both = self.client.mesh(labels, labels="all")
         self.assertEqual(self.counts(seen["labels"]), (len(both.vertices), len(both.faces), ["distance_mm", "label"]))
         self.assertEqual(seen["labels"]["arrays"]["label"], [len(both.faces), 1, 2])
