@@ -49,7 +49,7 @@ def until(what, seconds=60, every=0.1):
 class Orthanc:
     """A PACS in a folder of its own."""
 
-    def __init__(self, folder, user=None, port=None):
+    def __init__(self, folder, user=None, port=None, plugins=(), more=None):
         self.folder = folder
         self.port = port or free_port()
         self.user = user
@@ -58,10 +58,11 @@ class Orthanc:
             "Name": "test", "StorageDirectory": os.path.join(folder, "db"),
             "IndexDirectory": os.path.join(folder, "db"), "HttpPort": self.port,
             "DicomServerEnabled": True, "DicomAet": "ORTHANC", "DicomPort": free_port(),
-            "DicomCheckCalledAet": True, "DicomAlwaysAllowStore": True, "Plugins": [PLUGIN], "RemoteAccessAllowed": True,
+            "DicomCheckCalledAet": True, "DicomAlwaysAllowStore": True, "Plugins": [PLUGIN, *plugins], "RemoteAccessAllowed": True,
             "AuthenticationEnabled": user is not None, "OverwriteInstances": False,
             "RegisteredUsers": {user[0]: user[1]} if user else {},
             "DicomWeb": {"Enable": True, "Root": "/dicom-web/"},
+            **(more or {}),
         }
         self.dicom_port = configuration["DicomPort"]
         self.configuration = os.path.join(folder, "orthanc.json")
