@@ -29,6 +29,8 @@ export class Frame {
   ) {
     this.painting = new Painting(renderer, scene, camera);
     camera.layers.enable(overLayer);
+    // three clears a new context to black until it has drawn something.
+    renderer.domElement.addEventListener('webglcontextrestored', () => renderer.setClearAlpha(0));
   }
 
   // `then` is told whether the picture is there: `isOver` may have ended it between two steps. `after` draws over it.
