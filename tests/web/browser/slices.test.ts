@@ -186,7 +186,7 @@ describe('slices before there is a mesh', () => {
 
   it('show another volume over them where it lies in the patient, and the maximum of a slab', async ({ page, daemon }) => {
     // A block of 11 mm on the left and at the back of the ball, whose axes run in another order and the other way.
-    const block = Buffer.alloc(12 ** 3, 200);
+    const block = Buffer.from(Array.from({ length: 12 ** 3 }, (_, i) => 200 + ((7 * i) % 50)));
     const header = 'NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 12 12 12\nspace directions: (0,1,0) (1,0,0) (0,0,-1)\nspace origin: (30,30,35)\nencoding: raw\n\n';
     block[0] = 0;
     const overlay = await daemon.upload(Buffer.concat([Buffer.from(header), block]));

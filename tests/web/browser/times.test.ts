@@ -192,7 +192,7 @@ it('a drag of the iso-value', async ({ page, daemon }) => {
   await sheet.close();
 });
 
-// The processor's time: others may use the machine. The server has few jobs, of which the page is told many.
+// The processor's time of the page's thread: others may use the machine. The server has few jobs, of which the page is told many.
 it('a list of three hundred jobs that is scrolled', async ({ daemon, page }) => {
   const volume = await daemon.upload(ballNrrd(16, 5));
   const job = await daemon.make({ volume, iso: 100, formats: ['stl'] });
