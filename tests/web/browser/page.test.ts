@@ -2,7 +2,7 @@
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import { beforeAll, describe, expect } from 'vitest';
-import { contourPixels, silhouette } from './seen';
+import { contourPixels, pixelsOf, silhouette } from './seen';
 import {
   ballNrrd,
   boxOf,
@@ -173,6 +173,27 @@ describe('a surface', () => {
     }
   });
 
+  it('is there again, with its background, after the graphics processor was lost', async ({ page }) => {
+    await openSurface(at, made.id);
+    await still(page);
+    const view = page.locator('.viewport');
+    const corner = async (): Promise<number[]> =>
+      (await pixelsOf(page, await view.screenshot())).evaluate(({ data, width }) => [...data.subarray(4 * (width - 3), 4 * (width - 2))]);
+    const [before, background] = [await silhouette(page, view), await corner()];
+    await page.locator('.viewport canvas').evaluate(async (canvas: HTMLCanvasElement) => {
+      const context = canvas.getContext('webgl2')?.getExtension('WEBGL_lose_context');
+      for (const [name, change] of [['webglcontextlost', () => context?.loseContext()], ['webglcontextrestored', () => context?.restoreContext()]] as const) {
+        const changed = new Promise((resolve) => canvas.addEventListener(name, resolve, { once: true }));
+        change();
+        await changed;
+        // A context can be restored once the event is over.
+        await new Promise((resolve) => setTimeout(resolve));
+      }
+    });
+    await expect.poll(async () => (await silhouette(page, view)).part).toBeCloseTo(before.part, 2);
+    expect(await corner()).toEqual(background);
+  });
+
   it('is compared with others by linked cameras', async ({ daemon, page }) => {
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await page.getByRole('button', { name: '0, 5 and 10 passes' }).click();
@@ -189,6 +210,10 @@ describe('a surface', () => {
     for (const cell of await page.locator('.cell .viewport').all()) {
       expect((await silhouette(page, cell)).part).toBeGreaterThan(0.05);
     }
+    // They begin at one height, however long their heads are.
+    await page.locator('.cell h2').first().evaluate((title) => title.append(' of a long title'.repeat(20)));
+    const tops = await page.locator('.cell .viewport').evaluateAll((views) => views.map((view) => Math.round(view.getBoundingClientRect().top)));
+    expect(new Set(tops).size).toBe(1);
     // Their style is in the address as well.
     const flat = page.getByRole('toolbar', { name: 'View of all surfaces' }).getByRole('button', { name: 'Flat' });
     await flat.click();

@@ -2,7 +2,7 @@
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels } from './seen';
-import { ballNrrd, boxOf, drag, noted, nrrdHeader, openedJob, settled, setup } from './support';
+import { ballNrrd, boxOf, drag, labelsNrrd, noted, nrrdHeader, openedJob, settled, setup } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -186,7 +186,7 @@ describe('slices before there is a mesh', () => {
 
   it('show another volume over them where it lies in the patient, and the maximum of a slab', async ({ page, daemon }) => {
     // A block of 11 mm on the left and at the back of the ball, whose axes run in another order and the other way.
-    const block = Buffer.alloc(12 ** 3, 200);
+    const block = Buffer.from(Array.from({ length: 12 ** 3 }, (_, i) => 200 + ((7 * i) % 50)));
     const header = 'NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 12 12 12\nspace directions: (0,1,0) (1,0,0) (0,0,-1)\nspace origin: (30,30,35)\nencoding: raw\n\n';
     block[0] = 0;
     const overlay = await daemon.upload(Buffer.concat([Buffer.from(header), block]));
@@ -239,6 +239,26 @@ describe('slices before there is a mesh', () => {
     const controls = ['Show', 'Thickness', 'Colours', 'Coordinates', 'Layout'];
     expect(await Promise.all(controls.map((name) => page.getByLabel(name, { exact: true }).inputValue()))).toEqual(['maximum', '40', 'hot', 'RAS', 'large']);
     await expect.poll(() => page.locator('[data-plane=axial] .slice-where').innerText()).toContain('RAS');
+  });
+
+  it('show labels over them in the colours and with the names of their file', async ({ page, daemon }) => {
+    const fields = ['Segment0_ID:=a', 'Segment0_Name:=Left half', 'Segment0_LabelValue:=1', 'Segment0_Layer:=0', 'Segment0_Color:=0 0 1'];
+    const overlay = await daemon.upload(labelsNrrd(48, fields));
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/volumes/${ball}?iso=100&at=16,24,24`);
+    await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
+    await page.getByLabel('Overlay', { exact: true }).selectOption(overlay);
+    await page.getByLabel('Opacity of the overlay').fill('1');
+    const blue = (): Promise<number> =>
+      page.evaluate(() => {
+        const canvas = document.querySelector<HTMLCanvasElement>('[data-plane=axial] canvas');
+        const data = canvas?.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height).data ?? [];
+        let count = 0;
+        for (let i = 0; i < data.length; i += 4) if (data[i] === 0 && data[i + 1] === 0 && data[i + 2] === 255) count += 1;
+        return count;
+      });
+    await expect.poll(blue).toBeGreaterThan(500);
+    await expect.poll(() => page.locator('[data-plane=axial] .slice-reading').innerText()).toMatch(/Left half/);
   });
 
   it('show bright structures in a slab over any window', async ({ page, daemon }) => {

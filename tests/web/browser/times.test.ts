@@ -191,3 +191,35 @@ it('a drag of the iso-value', async ({ page, daemon }) => {
   writeFileSync(join(folder, 'drag.png'), await sheet.locator('body').screenshot());
   await sheet.close();
 });
+
+// The processor's time of the page's thread: others may use the machine. The server has few jobs, of which the page is told many.
+it('a list of three hundred jobs that is scrolled', async ({ daemon, page }) => {
+  const volume = await daemon.upload(ballNrrd(16, 5));
+  const job = await daemon.make({ volume, iso: 100, formats: ['stl'] });
+  const jobs = Array.from({ length: 300 }, (_, at) => ({ ...job, id: `${job.id.slice(0, -3)}${at + 100}` }));
+  await page.route(({ pathname }) => pathname === '/v1/jobs', (route) => {
+    const isAll = !new URL(route.request().url()).searchParams.has('state');
+    return route.fulfill({ json: { jobs: isAll ? jobs : [], next: null } });
+  });
+  await page.goto(`${daemon.url}/#/jobs`);
+  await expect.poll(() => page.locator('.jobs tbody tr').count()).toBe(300);
+  const session = await page.context().newCDPSession(page);
+  await session.send('Performance.enable', { timeDomain: 'threadTicks' });
+  const spent = async (): Promise<number> => {
+    const { metrics } = await session.send('Performance.getMetrics');
+    return 1000 * (metrics.find(({ name }) => name === 'TaskDuration')?.value ?? NaN);
+  };
+  const frames = 150;
+  const before = await spent();
+  const end = await page.locator('main').evaluate(async (main, count) => {
+    for (let frame = 0; frame < count; frame += 1) {
+      main.scrollTop += 60;
+      await new Promise(requestAnimationFrame);
+    }
+    return main.scrollTop;
+  }, frames);
+  const each = ((await spent()) - before) / frames;
+  say('ms of the processor for a frame of a list of 300 jobs', each.toFixed(1));
+  expect(end).toBeGreaterThan(3000);
+  expect(each).toBeLessThan(16);
+});

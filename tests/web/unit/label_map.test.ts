@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { coloursOf, LabelMap, paintLabels, seriesColour, windowsOf, type LabelLook } from '@/volume/label_map';
+import { coloursOf, LabelMap, lookOf, paintLabels, seriesColour, windowsOf, type LabelLook } from '@/volume/label_map';
 import { firstLabel } from '@/volume/preview';
 
 // What the daemon's picture of these samples would be.
@@ -42,6 +42,13 @@ describe('labels in pictures of eight bits', () => {
 });
 
 describe('slices of labels', () => {
+  it('have the colours of the file, and of the series where it has none', () => {
+    const look = lookOf([{ label: 3, color: '#102030' }, { label: 7, color: null }]);
+    expect([look.colourOf(3), look.colourOf(7)]).toEqual(['#102030', seriesColour(7)]);
+    expect([...coloursOf(look).slice(4, 8)]).toEqual([0x10, 0x20, 0x30, 255]);
+    expect(lookOf([{ label: 3 }], () => false).isShown(3)).toBe(false);
+  });
+
   const look: LabelLook = { map: named(1, 2, 3), colourOf: (label) => ['', '#ff0000', '#00ff00', '#0000ff'][Number(label)] ?? '', isShown: (label) => label !== 3 };
 
   it('are painted in their colours: borders wholly, what is within with an opacity, what is hidden not at all', () => {

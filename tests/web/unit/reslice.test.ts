@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Vec3, Volume } from '@/api/types';
 import { axisIndex, toPatient } from '@/volume/geometry';
 import type { Preview } from '@/volume/preview';
-import { resliced } from '@/volume/reslice';
+import { nearestValue, resliced } from '@/volume/reslice';
 
 // 4 a millimetre along the patient's first axis and 2 along its third, on a lattice of its own: 2 mm steps, turned and mirrored.
 function ramp(): Preview {
@@ -22,6 +22,14 @@ function ramp(): Preview {
 const volume = { dims: [10, 12, 14], spacing: [1, 1.5, 0.5], origin: [10, 4, 6], direction: [1, 0, 0, 0, 1, 0, 0, 0, 1] } as unknown as Volume;
 
 describe('a slice of another volume', () => {
+  it('has no numbers between those of labels', () => {
+    const preview = { ...ramp(), samples: ramp().samples.map((_, at) => (at % 20 < 5 ? 1 : 5)) };
+    const { values } = resliced(preview, volume, 'y', 5, null, true);
+    expect(new Set(values)).toEqual(new Set([1, 5]));
+    // Its lattice's first axis is the patient's third: the fifth of steps of 2 mm.
+    expect([8, 10, -9, 200].map((z) => nearestValue(preview, [10, 10, z]))).toEqual([1, 5, 0, 0]);
+  });
+
   it.each(['x', 'y', 'z'] as const)('has its values where they lie in the patient, along %s', (axis) => {
     const index = 5;
     const { width, height, values } = resliced(ramp(), volume, axis, index);

@@ -15,9 +15,14 @@ export function clipTo(camera: PerspectiveCamera, target: Vector3, [low, high]: 
   camera.updateProjectionMatrix();
 }
 
+// What the view shows from top to bottom at the point that it looks at.
+export function heightOf({ offset }: Pick<CameraPlace, 'offset'>): number {
+  return 2 * Math.hypot(...offset) * Math.tan((verticalAngle * Math.PI) / 360);
+}
+
 // The same view farther to the right and up, in parts of the view's height.
 export function panned(camera: PerspectiveCamera, { offset, target }: CameraPlace, right: number, up: number): CameraPlace {
-  const height = 2 * Math.hypot(...offset) * Math.tan((verticalAngle * Math.PI) / 360);
+  const height = heightOf({ offset });
   const shift = new Vector3(right * height, up * height, 0).applyQuaternion(camera.quaternion);
   return { offset, target: [target[0] + shift.x, target[1] + shift.y, target[2] + shift.z] };
 }

@@ -11,7 +11,10 @@ export interface Manner {
   sharpness: number;
 }
 
-const mostPixelRatio = 2;
+// Pixels for each of the page's.
+export function screenRatio(): number {
+  return Math.min(2, window.devicePixelRatio);
+}
 
 export class Frame {
   readonly painting: Painting;
@@ -26,12 +29,14 @@ export class Frame {
   ) {
     this.painting = new Painting(renderer, scene, camera);
     camera.layers.enable(overLayer);
+    // three clears a new context to black until it has drawn something.
+    renderer.domElement.addEventListener('webglcontextrestored', () => renderer.setClearAlpha(0));
   }
 
   // `then` is told whether the picture is there: `isOver` may have ended it between two steps. `after` draws over it.
   paint({ steps, sharpness }: Manner, isOver: () => boolean, after: () => void, then: (isWhole: boolean) => void): void {
     const { clientWidth, clientHeight } = this.renderer.domElement;
-    const ratio = sharpness * Math.min(mostPixelRatio, window.devicePixelRatio);
+    const ratio = sharpness * screenRatio();
     const [width, height] = [Math.floor(ratio * clientWidth), Math.floor(ratio * clientHeight)];
     // By a picture that is not whole yet.
     this.showAll();

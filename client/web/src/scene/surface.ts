@@ -10,10 +10,10 @@ import { Components } from './components';
 import { Cross } from './cross';
 import { Cut } from './cut';
 import { efforts, FrameBudget } from './budget';
-import { addLights, clipTo, controlsOf, facing, panned, placeOf, verticalAngle } from './camera';
+import { addLights, clipTo, controlsOf, facing, heightOf, panned, placeOf, verticalAngle } from './camera';
 import { CoarseMaker } from './coarse_maker';
 import type { Reach } from './distances';
-import { Frame, type Manner } from './frame';
+import { Frame, screenRatio, type Manner } from './frame';
 import { joinSeams } from './joining';
 import { Parts } from './parts';
 import { pickedAt, type Picked } from './picked';
@@ -314,12 +314,13 @@ export class Surface {
     });
   }
 
-  // The picture as it is, over that colour.
-  picture(background: string): Promise<Blob> {
+  // What is seen, with two pixels for each of the page's; beside the texts of the distances' colours.
+  picture(distances: readonly string[]): Promise<Blob> {
     this.setCoarse(false);
-    this.render({ steps: 1, sharpness: 1 });
-    const scale = this.canvas.width / Math.max(1, this.host.clientWidth);
-    return pictureOf(this.canvas, background, (context) => this.rulers.paintLabels(context, this.camera, scale));
+    this.render({ steps: 1, sharpness: 2 / screenRatio() });
+    const captions = { scale: this.canvas.height / Math.max(1, this.host.clientHeight), seen: heightOf(this.place), distances };
+    this.draw();
+    return pictureOf(this.canvas, captions, (context) => this.rulers.paintLabels(context, this.camera, captions.scale));
   }
 
   dispose(): void {

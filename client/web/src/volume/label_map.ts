@@ -14,6 +14,8 @@ const exactValues = 254;
 // Each is a request for each slice.
 const mostWindows = 8;
 const mostSample = 2 ** 32 - 1;
+// Whose numbers fit into eight bits.
+export const mostInBytes = 255;
 
 let lastKey = 0;
 
@@ -93,6 +95,12 @@ export interface LabelLook {
   isShown: (label: Label) => boolean;
 }
 
+// In the colours of the file, or of the series.
+export function lookOf(labels: readonly MappedLabel[], isShown: LabelLook['isShown'] = () => true): LabelLook {
+  const colours = new Map(labels.map((one) => [one.label, colourOf(one)]));
+  return { map: new LabelMap(labels), colourOf: (label) => colours.get(label) ?? seriesColour(label), isShown };
+}
+
 // Red, green, blue and opacity of each number; nothing is seen of 0 and of what is hidden.
 export function coloursOf({ map, colourOf: colour, isShown }: LabelLook): Uint8Array<ArrayBuffer> {
   const table = new Uint8Array(4 * (map.labels.length + 1));
@@ -106,7 +114,7 @@ export interface NumberedSlice {
   width: number;
   height: number;
   // Of the labels, row by row.
-  labels: Uint16Array;
+  labels: ArrayLike<number>;
 }
 
 // The pixels of a slice: samples at the border of a label are seen as they are, those within with that opacity.

@@ -36,6 +36,11 @@ export function isInteger({ type, range }: Pick<Volume, 'type' | 'range'>): bool
   return !type.startsWith('float') && range.every(Number.isInteger);
 }
 
+// Each of its values is one of a segmentation, as the server tells it.
+export function areLabels(volume: Pick<Volume, 'type' | 'range' | 'notes'>): boolean {
+  return isInteger(volume) && volume.notes.some(({ code }) => code === 'looks-like-labels');
+}
+
 export function spanOf({ range: [low, high] }: Pick<Volume, 'range'>): number {
   return high - low;
 }

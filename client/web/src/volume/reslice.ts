@@ -99,7 +99,7 @@ function layersOf(middle: number, reach: number, last: number): Layer[] {
   return places.map((at, index) => ({ at, part: ((places[index + 1] ?? at) - (places[index - 1] ?? at)) / (2 * (high - low)) }));
 }
 
-export function resliced(preview: Preview, volume: Volume, axis: Axis, index: number, slab: Slab | null = null): Resliced {
+export function resliced(preview: Preview, volume: Volume, axis: Axis, index: number, slab: Slab | null = null, isNearest = false): Resliced {
   const normal = axisIndex(axis);
   const [across, downwards] = pictureAxes(axis);
   const reach = slab ? slab.thickness / sliceDistance(volume, axis) / 2 : 0;
@@ -111,7 +111,13 @@ export function resliced(preview: Preview, volume: Volume, axis: Axis, index: nu
     steps: [stepAlong(across), stepAlong(downwards), stepAlong(normal)],
     layers: layersOf(index, reach, volume.dims[normal] - 1),
     projection: slab?.projection ?? 'maximum',
+    isNearest,
   });
+}
+
+// That of the sample at a point of the patient; 0 outside.
+export function nearestValue(preview: Preview, point: Vec3): number {
+  return nearest(preview)(...inSamplesOf(preview).at(point));
 }
 
 export interface Square {

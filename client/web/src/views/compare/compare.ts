@@ -99,7 +99,8 @@ class Comparison {
     private readonly scope: Scope,
     jobs: readonly Job[],
     private readonly volumes: KnownVolumes,
-    private readonly camera: CameraPlace | null,
+    // That of all surfaces, also of those that are still to come.
+    private camera: CameraPlace | null,
     style: string,
   ) {
     this.look = new URLSearchParams({ style });
@@ -176,18 +177,18 @@ class Comparison {
 
   // A surface whose camera moves those of the others.
   private addPane(job: Job, labels: readonly LabelSummary[]): SurfacePane {
-    const camera = this.panes[0]?.camera ?? this.camera;
     const volume = this.volumes.get(job.volume);
     const pane = new SurfacePane(this.scope, job, {
       hasKeys: false,
       onSlices: null,
       look: this.look,
-      camera,
+      camera: () => this.camera,
       volume,
       labels: new LabelState(labels, volume !== undefined && volume !== null && isRenumbered(volume)),
     });
     this.panes.push(pane);
     pane.onCamera = (place) => {
+      this.camera = place;
       for (const other of this.panes) if (other !== pane) other.follow(place);
       this.noteCamera(place);
     };

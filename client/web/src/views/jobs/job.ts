@@ -166,7 +166,7 @@ function showSurface(
   const camera = placeOfText(route.query.get('cam') ?? '');
   const slices = volume && new SlicesBeside(scope, job, volume, labels, stageArea, route.query);
   const onSlices = slices && ((): void => slices.toggle());
-  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices, look: route.query });
+  const pane = new SurfacePane(scope, job, { hasKeys: true, camera: () => camera, volume, labels, onSlices, look: route.query });
   pane.onLook = noteInAddress;
   slices?.linkTo(pane);
   pane.onTools = () => slices?.restore();

@@ -8,7 +8,7 @@ import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
 import { NumberField } from '../../ui/number_field';
 import type { Scope } from '../../ui/signal';
-import { colourOf, LabelMap, seriesColour, type LabelLook } from '../../volume/label_map';
+import { colourOf, lookOf, type LabelLook } from '../../volume/label_map';
 import { opacityControl } from './label_opacity';
 import { LabelSearch, swatchOf } from './label_search';
 
@@ -106,12 +106,7 @@ export class LabelChoice {
       ),
     );
     this.search.fill();
-    const colours = new Map(labels.map((one) => [one.label, colourOf(one)]));
-    this.shown = isRenumbered(this.volume) ? null : {
-      map: new LabelMap(labels),
-      colourOf: (label) => colours.get(label) ?? seriesColour(label),
-      isShown: (label) => this.chosen.has(label),
-    };
+    this.shown = isRenumbered(this.volume) ? null : lookOf(labels, (label) => this.chosen.has(label));
     this.onLook();
   }
 
@@ -143,9 +138,9 @@ export class LabelChoice {
       else this.chosen.delete(label.label);
       this.changed();
     });
-    const size = h('span.faint.number');
+    const size = h('span.faint');
     const box = {
-      element: h('li', { 'data-label': label.label }, swatchOf(colourOf(label)), check, size, [
+      element: h('li', { 'data-label': label.label }, swatchOf(colourOf(label)), h('div.label-text', check, size), [
         button('Show', () => this.onPlace(middleOf(label)), { class: 'quiet', 'aria-label': `Show ${labelTitle(label)} in the slices` }),
       ]),
       input: check.querySelector('input') as HTMLInputElement,

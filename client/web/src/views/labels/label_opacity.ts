@@ -5,8 +5,8 @@ import { coloursOf, paintLabels, type LabelLook, type NumberedSlice } from '../.
 
 export const labelOpacity = new Signal(0.75);
 
-export function labelImage(slice: NumberedSlice, look: LabelLook): ImageData {
-  return new ImageData(paintLabels(slice, coloursOf(look), labelOpacity.value), slice.width, slice.height);
+export function labelImage(slice: NumberedSlice, look: LabelLook, opacity = labelOpacity.value): ImageData {
+  return new ImageData(paintLabels(slice, coloursOf(look), opacity), slice.width, slice.height);
 }
 
 export function opacityControl(): HTMLElement {

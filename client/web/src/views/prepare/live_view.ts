@@ -10,7 +10,7 @@ import { formatValue } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
 import { toPatient } from '../../volume/geometry';
 import type { Box } from '../../volume/crop';
-import { coloursOf, LabelMap, type LabelLook } from '../../volume/label_map';
+import { coloursOf, LabelMap, mostInBytes, type LabelLook } from '../../volume/label_map';
 import { lookOf, looksFor, type LookName } from '../../volume/looks';
 import type { Preview } from '../../volume/preview';
 import { fetchLabelPreview, fetchPreview, largestPreview } from '../../volume/preview_file';
@@ -19,7 +19,6 @@ import type { Window } from '../../volume/slices';
 // Samples along an axis: what is there soon, and what is drawn then.
 const firstSize = 64;
 const softwareSize = 128;
-const mostLabels = 255;
 const retryDelay = 3000;
 const turnStep = Math.PI / 24;
 
@@ -35,7 +34,7 @@ export interface LiveHost {
 
 // As many of them as eight bits can number.
 function inBytes(map: LabelMap): LabelMap {
-  return map.labels.length <= mostLabels ? map : new LabelMap(map.labels.slice(0, mostLabels));
+  return map.labels.length <= mostInBytes ? map : new LabelMap(map.labels.slice(0, mostInBytes));
 }
 
 export class LiveView {

@@ -19,7 +19,7 @@ import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
 import { isCt } from '../../volume/looks';
 import type { LabelLook } from '../../volume/label_map';
-import { eachLabel, isInteger, spanOf, volumeName } from '../../volume/names';
+import { areLabels, eachLabel, isInteger, spanOf, volumeName } from '../../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { CropControl } from './crop_control';
 import { estimateTexts, simplifiedInWords } from './estimate_texts';
@@ -52,8 +52,7 @@ export async function prepareView(scope: Scope, route: Route): Promise<HTMLEleme
 function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
   const parameters = parametersOfQuery(query, defaults);
   // An iso-value makes one surface of all labels above it, which users rarely want.
-  const areLabels = isInteger(volume) && volume.notes.some(({ code }) => code === 'looks-like-labels');
-  return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
+  return areLabels(volume) && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
 }
 
 class Prepare {
@@ -110,8 +109,8 @@ class Prepare {
     this.oblique = new ObliqueView({ volume, setCursor: (cursor) => this.setCursor(cursor), cursor: () => this.cursor, window: () => this.window }, scope);
     restoreLooks(route.query);
     this.measures = new SliceMeasures(route.query.get('measured') ?? '');
-    const areLabels = (): boolean => isByLabels(this.parameters);
-    this.layers = new SliceLayers({ volume, commonWindow: common, window: () => this.window, oblique: this.oblique, areLabels, query: route.query }, scope);
+    const byLabels = (): boolean => isByLabels(this.parameters);
+    this.layers = new SliceLayers({ volume, commonWindow: common, window: () => this.window, oblique: this.oblique, areLabels: byLabels, query: route.query }, scope);
     const host = this.sliceHost(common);
     this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));

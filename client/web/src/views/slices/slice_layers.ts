@@ -1,18 +1,22 @@
 // Layers of slices beside their own samples: another volume over them, and a projection of the slab around them.
 import { client, onReconnect } from '../../client';
-import type { Axis, Volume } from '../../api/types';
+import type { Axis, Vec3, Volume } from '../../api/types';
+import { isRenumbered, labelTitle } from '../../job/labels';
 import { checkbox, field, h, select } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
-import { tellError } from '../../ui/notices';
+import { tell, tellError } from '../../ui/notices';
 import { imageOf, paintImage } from '../../ui/pixels';
 import { Signal, type Scope } from '../../ui/signal';
 import { defaultWindow } from '../../volume/histogram';
-import { volumeName } from '../../volume/names';
+import { toPatient } from '../../volume/geometry';
+import { lookOf, mostInBytes, type LabelLook } from '../../volume/label_map';
+import { areLabels, volumeName } from '../../volume/names';
 import type { Preview } from '../../volume/preview';
-import { fetchPreview, largestPreview } from '../../volume/preview_file';
+import { fetchLabelPreview, fetchPreview, largestPreview } from '../../volume/preview_file';
 import { PreviewLoader } from '../../volume/preview_loader';
-import { resliced, type Slab } from '../../volume/reslice';
+import { nearestValue, resliced, type Slab } from '../../volume/reslice';
 import { windowToFetch, type Slice, type Window } from '../../volume/slices';
+import { labelImage } from '../labels/label_opacity';
 import type { ObliqueView } from './oblique_view';
 import { pixelsOf } from './slice_looks';
 import { slabOfText, slabToText, thicknesses } from './slice_texts';
@@ -32,7 +36,9 @@ const hot = pixelsOf('hot').map((_, value, colours) => {
 
 interface Layer {
   volume: Volume;
+  // Of values, or of the numbers of labels.
   preview: Preview;
+  labels: LabelLook | null;
 }
 
 // Keeps what was made last for each axis.
@@ -142,11 +148,21 @@ export class SliceLayers {
     context.globalAlpha *= this.opacity.valueAsNumber;
     const picture = this.overlays.get(axis, [other.volume.id, index].join(), () => {
       const canvas = h('canvas');
-      paintImage(canvas, imageOf(resliced(other.preview, volume, axis, index), hot));
+      const { preview, labels } = other;
+      const values = resliced(preview, volume, axis, index, null, labels !== null);
+      paintImage(canvas, labels ? labelImage({ ...values, labels: values.values }, labels, 1) : imageOf(values, hot));
       return canvas;
     });
+    context.imageSmoothingEnabled &&= other.labels === null;
     context.drawImage(picture, 0, 0);
     context.globalAlpha = before;
+  }
+
+  // The label of the other volume at that place; '' for none.
+  labelAt(place: Vec3): string {
+    if (!this.other?.labels) return '';
+    const label = this.other.labels.map.at(nearestValue(this.other.preview, toPatient(this.host.volume, place)));
+    return label ? labelTitle(label) : '';
   }
 
   private slabControls(): HTMLElement[] {
@@ -234,13 +250,32 @@ export class SliceLayers {
     this.changed();
     if (id === '') return;
     try {
-      const [volume, counts] = await Promise.all([client.getVolume(id), client.histogramOf(id, bins, wanted.signal)]);
-      const preview = await fetchPreview(id, largestPreview, defaultWindow(counts, volume.suggested_iso), wanted.signal);
-      this.other = { volume, preview };
+      const volume = await client.getVolume(id);
+      const other = (await this.labelLayer(volume, wanted.signal)) ?? (await this.valueLayer(volume, wanted.signal));
+      if (wanted.signal.aborted) return;
+      this.other = other;
       this.changed();
     } catch (error) {
       if (!wanted.signal.aborted) throw error;
     }
+  }
+
+  private async valueLayer(volume: Volume, signal: AbortSignal): Promise<Layer> {
+    const counts = await client.histogramOf(volume.id, bins, signal);
+    return { volume, preview: await fetchPreview(volume.id, largestPreview, defaultWindow(counts, volume.suggested_iso), signal), labels: null };
+  }
+
+  // Null where a volume has no labels, or where samples of a preview do not tell them.
+  private async labelLayer(volume: Volume, signal: AbortSignal): Promise<Layer | null> {
+    if (!areLabels(volume) || isRenumbered(volume)) return null;
+    const { labels } = await client.labelsOf(volume.id, 0, signal);
+    if (labels.length === 0) return null;
+    if (labels.length > mostInBytes || volume.dims.some((count) => count > largestPreview)) {
+      tell(`The overlay has values instead of labels: it has more than ${mostInBytes} labels, or more than ${largestPreview} samples along an axis.`);
+      return null;
+    }
+    const look = lookOf(labels);
+    return { volume, preview: await fetchLabelPreview(volume.id, look.map, signal), labels: look };
   }
 
   private changed(): void {

@@ -18,6 +18,8 @@ export interface ReadoutHost {
   slabOf: (slice: Slice) => Slice | null;
   // Null where samples are values.
   labels: () => LabelLook | null;
+  // The label of the overlay there; '' for none.
+  overlaid: (place: Vec3) => string;
 }
 
 // Keeps the digits that the eight bits of a picture over that window tell.
@@ -44,7 +46,7 @@ export class SliceReadout {
 
   show(cursor: Vec3): void {
     const place = this.pointed ?? cursor;
-    const value = this.textAt(place);
+    const value = [this.textAt(place), this.host.overlaid(place)].filter(Boolean).join(' \u00b7 ');
     const where = placeText(toPatient(this.host.volume, place), sliceSpace.value, this.host.volume.spacing);
     const text = [value, where].filter(Boolean).join(' \u00b7 ');
     if (this.element.textContent === text) return;

@@ -113,6 +113,7 @@ export class SliceView {
       slice: () => this.loader.slice,
       slabOf: ({ axis, index }) => host.layers?.projected(axis, index) ?? null,
       labels: () => host.state().labels,
+      overlaid: (place) => host.layers?.labelAt(place) ?? '',
     });
     this.zoom = new SliceZoom(this.canvas, scope, () => this.draw());
     this.element = h('figure.slice', { 'data-plane': plane }, [

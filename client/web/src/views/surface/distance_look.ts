@@ -19,6 +19,7 @@ export class DistanceLook {
   private reach: Reach | null = null;
   private top: Top = 'p99';
   private readonly ends = h('div.legend-ends');
+  private texts: string[] = [];
   private readonly value = h('output.legend-value');
   private timer = 0;
 
@@ -64,6 +65,11 @@ export class DistanceLook {
     return this.reach !== null;
   }
 
+  // For a picture; none where no distances are seen.
+  get captions(): readonly string[] {
+    return this.isOn ? this.texts : [];
+  }
+
   set(isOn: boolean): void {
     if (!this.reach) return;
     this.isOn = isOn;
@@ -77,9 +83,9 @@ export class DistanceLook {
     if (!this.reach) return;
     const top = this.reach[this.top];
     this.surface.setDistanceTop(top);
-    const texts = top === 0 ? ['0 mm everywhere'] : ['0', millimetres(top / 2), `${millimetres(top)} mm`];
-    if (this.top === 'p99' && top > 0) texts[2] += ' or more';
-    this.ends.replaceChildren(...texts.map((text) => h('span', text)));
+    this.texts = top === 0 ? ['0 mm everywhere'] : ['0', millimetres(top / 2), `${millimetres(top)} mm`];
+    if (this.top === 'p99' && top > 0) this.texts[2] += ' or more';
+    this.ends.replaceChildren(...this.texts.map((text) => h('span', text)));
   }
 
   private moved({ clientX, clientY, buttons }: PointerEvent): void {

@@ -20,7 +20,6 @@ import { formatCount, formatSize } from '../../ui/format';
 import { refusal, tell, tellError } from '../../ui/notices';
 import { saveBlob } from '../../ui/save';
 import { Scope } from '../../ui/signal';
-import { cssColour } from '../../ui/theme';
 import { ComponentList } from './component_list';
 import { CutTool } from './cut_tool';
 import { DistanceLook } from './distance_look';
@@ -33,7 +32,8 @@ const turnStep = Math.PI / 36;
 export interface PaneOptions {
   // Keys of the whole window are this pane's.
   hasKeys: boolean;
-  camera: CameraPlace | null;
+  // When the surface comes to be drawn; null where it is looked at as a whole.
+  camera: () => CameraPlace | null;
   // Null where slices cannot be shown: the volume is gone.
   volume: Volume | null;
   // Shows slices beside the surface, or takes them away; null where there are none.
@@ -97,9 +97,11 @@ export class SurfacePane {
     if (!mesh || !surface) return null;
     this.surface = surface;
     this.scope.onEnd(() => surface.dispose());
-    this.prepareSurface(surface);
+    // Whoever follows this surface does not follow it to the camera that its bounds give.
+    const camera = this.options.camera();
     surface.setBounds(mesh.bounds);
-    if (this.options.camera) surface.moveTo(this.options.camera);
+    this.prepareSurface(surface);
+    surface.moveTo(camera ?? surface.place);
     this.restore(surface, this.options.look);
     this.onTools?.();
     try {
@@ -182,10 +184,6 @@ export class SurfacePane {
 
   follow(place: CameraPlace): void {
     this.surface?.follow(place);
-  }
-
-  get camera(): CameraPlace | null {
-    return this.surface?.place ?? null;
   }
 
   setStyle(change: Partial<SurfaceStyle>): void {
@@ -312,7 +310,7 @@ export class SurfacePane {
         this.options.volume && this.toggle('cut', 'Cut', 'Cut the surface along a slice (c)', () => this.toggleCut()),
         this.options.onSlices && this.toggle('slices', 'Slices', 'Show slices beside the surface (x)', () => this.options.onSlices?.()),
         this.toggle('measure', 'Measure', 'Measure the distance between two points (m)', () => this.toggleMeasure()),
-        button('Picture', () => void this.savePicture(surface), { title: 'Save this view as a PNG file' }),
+        button('Picture', () => void this.savePicture(surface), { title: 'Save this view as a PNG file, without a background' }),
       ]),
     ]);
   }
@@ -375,13 +373,14 @@ export class SurfacePane {
 
   // As it is looked at, and from three sides.
   async pictures(): Promise<Blob[]> {
-    const { surface } = this;
+    const { surface, distance } = this;
     if (!surface || !this.isWhole) return [];
+    const captions = distance?.captions ?? [];
     const { place } = surface;
-    const blobs = [await surface.picture('#fff')];
+    const blobs = [await surface.picture(captions)];
     for (const view of ['A', 'L', 'S'] as const) {
       surface.look(view);
-      blobs.push(await surface.picture('#fff'));
+      blobs.push(await surface.picture(captions));
     }
     surface.moveTo(place);
     return blobs;
@@ -389,8 +388,7 @@ export class SurfacePane {
 
   private async savePicture(surface: Surface): Promise<void> {
     try {
-      const blob = await surface.picture(cssColour('--viewport'));
-      saveBlob(blob, fileNameOf(this.job, this.options.volume, '.png'));
+      saveBlob(await surface.picture(this.distance?.captions ?? []), fileNameOf(this.job, this.options.volume, '.png'));
     } catch (error) {
       tellError(error);
     }
