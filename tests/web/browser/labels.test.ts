@@ -53,7 +53,7 @@ describe('the labels of a surface', () => {
     await page.getByLabel('Order of the labels').selectOption('by name');
     await page.getByLabel('Search the labels').fill('5');
     await expect.poll(order).toEqual(['5']);
-    expect(await rows.innerText()).toMatch(/volume .* mm³, of its voxels .* mm³; area .* mm²\s*1 component, .* triangles/);
+    await expect.poll(() => rows.innerText()).toMatch(/volume .* mm³, of its voxels .* mm³; area .* mm²\s*1 component, .* triangles/);
     const saving = page.waitForEvent('download');
     await page.getByRole('button', { name: 'Save as CSV' }).click();
     const file = await saving;
