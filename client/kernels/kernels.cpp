@@ -313,7 +313,7 @@ ISOMESH_EXPORT bool isomesh_wait(Run* run, std::int32_t longest_ms, double* prog
 
 ISOMESH_EXPORT void isomesh_cancel(Run* run) { run->cancel(); }
 
-// Of a run that has ended. The arrays live as long as the run.
+// A run that has ended owns these arrays, which live as long as it does.
 ISOMESH_EXPORT isomesh_made isomesh_result(const Run* run) { return run->made(); }
 
 // Cancels the run if it has not ended, and waits for its end.

@@ -1,4 +1,4 @@
-// What a program with a language model can do. Private to this folder.
+// The tools for a program with a language model. Private to this folder.
 #pragma once
 
 #include <filesystem>

@@ -89,7 +89,7 @@ export class Client {
     return this.connection.json(`/v1/volumes${queryOf({ order: 'newest', limit, cursor })}`, { signal });
   }
 
-  /** What the server knows of a volume: its grid, its values, what was decided when it was read. */
+  /** The grid and values of a volume, and what the server decided when it read it. */
   getVolume(id: string): Promise<Volume> {
     return this.connection.json(volumePath(id));
   }
@@ -203,7 +203,7 @@ export class Client {
     return labels;
   }
 
-  /** What a finished job made, of what and how. */
+  /** The report of a finished job: parameters, measurements, files and how the bound was proven. */
   reportOf(id: string, signal?: GlobalAbortSignal): Promise<JobReport> {
     return this.connection.json(`${jobPath(id)}/report`, { signal });
   }

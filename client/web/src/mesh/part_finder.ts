@@ -49,7 +49,7 @@ export class PartFinder {
     return [...this.parts.values()];
   }
 
-  // Of that block's vertex.
+  // The part that has the block's vertex.
   partOf(block: number, vertex: number): PartSummary | null {
     const first = this.firsts[block];
     return first === undefined ? null : (this.parts.get(this.rootOf(first + vertex)) ?? null);

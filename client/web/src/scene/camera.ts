@@ -15,7 +15,7 @@ export function clipTo(camera: PerspectiveCamera, target: Vector3, [low, high]: 
   camera.updateProjectionMatrix();
 }
 
-// What the view shows from top to bottom at the point that it looks at.
+// The height of the view at the point that it looks at.
 export function heightOf({ offset }: Pick<CameraPlace, 'offset'>): number {
   return 2 * Math.hypot(...offset) * Math.tan((verticalAngle * Math.PI) / 360);
 }

@@ -1,4 +1,4 @@
-// What surfaces are drawn with: materials and geometries.
+// Materials and geometries that surfaces are drawn with.
 import { BackSide, BufferAttribute, BufferGeometry, DoubleSide, FrontSide, MeshPhongMaterial } from 'three';
 import type { Coarse } from '../mesh/coarse';
 

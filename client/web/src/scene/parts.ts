@@ -30,7 +30,7 @@ export interface Hit {
   at: number; // along the ray
   label: Label | null;
   distance?: number; // where the surface has distances
-  // Which of the finest blocks, and a vertex of it; of a coarse level, -1.
+  // One of the finest blocks, and a vertex of it; -1 for a coarse level.
   block: number;
   vertex: number;
 }

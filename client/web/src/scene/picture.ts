@@ -2,7 +2,7 @@
 import { formatSize } from '../ui/format';
 import { colourAt } from './colour_map';
 
-// What is written over it.
+// The texts over it.
 export interface Captions {
   // Pixels for each of the page's.
   scale: number;

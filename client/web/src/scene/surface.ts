@@ -314,7 +314,7 @@ export class Surface {
     });
   }
 
-  // What is seen, with two pixels for each of the page's; beside the texts of the distances' colours.
+  // The view, with two pixels for each of the page's; beside the texts of the distances' colours.
   picture(distances: readonly string[]): Promise<Blob> {
     this.setCoarse(false);
     this.render({ steps: 1, sharpness: 2 / screenRatio() });

@@ -7,7 +7,7 @@ import { client, token } from '../client';
 const key = 'isomesh.login';
 const failed = 'The login failed';
 
-// What the page remembers while the person is at the provider.
+// The page remembers this while the person is at the provider.
 interface Begun {
   provider: LoginProvider;
   state: string;

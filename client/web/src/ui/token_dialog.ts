@@ -9,7 +9,7 @@ import { Signal } from './signal';
 // True if the dialog was closed without a token.
 const isDeclined = new Signal<boolean>(false);
 
-// What the dialog offers.
+// The dialog's choices.
 interface Ways {
   provider: LoginProvider | null;
   hasTokens: boolean;

@@ -14,7 +14,7 @@ const exactValues = 254;
 // Each is a request for each slice.
 const mostWindows = 8;
 const mostSample = 2 ** 32 - 1;
-// Whose numbers fit into eight bits.
+// Labels whose numbers fit into eight bits.
 export const mostInBytes = 255;
 
 let lastKey = 0;

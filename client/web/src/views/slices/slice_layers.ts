@@ -36,7 +36,7 @@ const hot = pixelsOf('hot').map((_, value, colours) => {
 
 interface Layer {
   volume: Volume;
-  // Of values, or of the numbers of labels.
+  // Values, or the numbers of labels.
   preview: Preview;
   labels: LabelLook | null;
 }

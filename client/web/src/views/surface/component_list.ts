@@ -27,7 +27,7 @@ export function keepOnlyAt(...points: Vec3[]): Partial<JobParameters> {
 export class ComponentList {
   // Null where a surface has only one, or is one of labels.
   readonly element: HTMLDetailsElement | null;
-  // What was clicked.
+  // The clicked one.
   readonly picked = h('div.picked-part', { role: 'status', hidden: true });
   private readonly body = h('div', h('p.hint', { role: 'status' }, 'Looking for connected components'));
   private readonly rows = new Map<number, HTMLElement>();
