@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cstring>
 #include <sstream>
 #include <stdexcept>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -17,6 +19,16 @@
 
 namespace isomesh::test {
 namespace {
+
+// The end of a child process interrupts connect(), which goes on by itself.
+bool is_connected_later(int socket) {
+  pollfd ready = {socket, POLLOUT, 0};
+  while (::poll(&ready, 1, -1) < 0 && errno == EINTR) {
+  }
+  int error = 0;
+  socklen_t size = sizeof error;
+  return ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
+}
 
 template <class Address>
 int connected(int family, const Address& address, const std::string& from) {
@@ -33,7 +45,8 @@ int connected(int family, const Address& address, const std::string& from) {
   const timeval longest = {std::chrono::seconds(kLongest).count(), 0};
   ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &longest, sizeof longest);
   ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &longest, sizeof longest);
-  if (::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  if (::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 &&
+      !(errno == EINTR && is_connected_later(socket))) {
     ::close(socket);
     throw std::runtime_error("no connection to the daemon");
   }
@@ -104,6 +117,7 @@ Connection::~Connection() { ::close(socket_); }
 bool Connection::send(std::string_view bytes) const {
   while (!bytes.empty()) {
     const ssize_t count = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
     if (count <= 0) return false;
     bytes.remove_prefix(static_cast<std::size_t>(count));
   }
