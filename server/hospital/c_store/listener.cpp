@@ -344,7 +344,9 @@ void DimseListener::note_end(const DimseEnded& ended, const std::string& party) 
 }
 
 void DimseListener::note_fault(const std::string& party, net::TlsFault fault) {
-  note_rejection(net::text_of(fault, "the peer"), {}, party);
+  note_rejection(entrance_ ? net::text_of(fault, "the peer")
+                           : "it uses TLS, but [dimse] has no certificate-file",
+                 {}, party);
 }
 
 void DimseListener::note_rejection(std::string_view reason, const DimseEnded& ended,
