@@ -1,4 +1,5 @@
 """C-STORE over TLS, in both directions, with DCMTK and Orthanc as peers."""
+import json
 import os
 import shutil
 import socket
@@ -81,7 +82,8 @@ class Encrypted(Receiver):
         self.assert_one_mesh(order, series)
         self.assertNotIn("PRIVATE KEY", daemon.logged())
         second = self.series()
-        status, _, said = self.pacs.call("POST", "/modalities/isomesh/store", second.uid_in(self.pacs))
+        found = json.loads(self.pacs.call("POST", "/tools/lookup", second.uid)[2])[0]["ID"]
+        status, _, said = self.pacs.call("POST", "/modalities/isomesh/store", found)
         self.assertEqual(status, 200, said)
         order = self.succeeded(daemon, self.only_order(daemon, second))
         self.assert_one_mesh(order, second)
@@ -186,8 +188,8 @@ class Encrypted(Receiver):
                      ("named", wrong[2], tls + ours, "is for another name"),
                      ("any", wrong[2], tls + ours + 'certificate-name = "*"\n', ""),
                      ("alias", wrong[2], tls + ours + 'certificate-name = "elsewhere.example.org"\n', ""),
-                     ("plain", None, tls + ours, "does not use TLS on this port"),
-                     ("secure", self.ours, "", "may expect TLS"),
+                     ("plain", None, tls + ours, "not use TLS on this port"),
+                     ("secure", self.ours, "", "it may expect TLS"),
                      ("anonymous", self.ours, tls, "refuses the certificate of isomeshd"),
                      ("unknown", self.ours, tls + f'certificate-file = "{strange[0]}"\n'
                       f'key-file = "{strange[1]}"\n', "refuses the certificate of isomeshd"),

@@ -56,6 +56,10 @@ void check_sent(const dimse::DimseSent& sent, std::string_view sop_class) {
     case DimseEnd::kNotAccepted:
       throw PacsFailure(PacsFault::kBusy,
                         "the PACS does not accept " + std::string(dicom::name_of_class(sop_class)));
+    case DimseEnd::kUnanswered:
+      throw PacsFailure(PacsFault::kUnreachable,
+                        "the PACS did not answer the request for an association: it may expect "
+                        "TLS, which tls = true switches on");
     case DimseEnd::kBroken:
       throw PacsFailure(PacsFault::kUnreachable, "the PACS ended the association");
     case DimseEnd::kTimeout:
@@ -124,7 +128,8 @@ std::unique_ptr<TlsRelay> encrypted(Descriptor& peer, const orders::PacsSettings
   }
 }
 
-void check_encryption(const TlsRelay& tls) {
+// Throws if an association ended because of its TLS.
+void check_encryption(const TlsRelay& tls, DimseEnd end) {
   const net::TlsFault fault = tls.fault();
   if (fault != net::TlsFault::kNone) {
     throw PacsFailure(
@@ -135,6 +140,10 @@ void check_encryption(const TlsRelay& tls) {
     throw PacsFailure(PacsFault::kUnreachable,
                       "the PACS ended the TLS connection before it answered: it may refuse the "
                       "certificate of isomeshd, or not use TLS on this port");
+  }
+  if (end == DimseEnd::kUnanswered) {
+    throw PacsFailure(PacsFault::kUnreachable,
+                      "the PACS did not answer the request for an association");
   }
 }
 
@@ -161,7 +170,7 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
       child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
   const dimse::DimseSent sent = sent_of(output, child);
   if (sent.end == DimseEnd::kUnreadable) processes_.renew();
-  if (tls && sent.end != DimseEnd::kResponded) check_encryption(*tls);
+  if (tls && sent.end != DimseEnd::kResponded) check_encryption(*tls, sent.end);
   check_sent(sent, object.sop_class);
 }
 
