@@ -21,7 +21,8 @@ void warn_if_readable(const std::filesystem::path& key) {
 
 void check_authorities(const std::string& option, const std::filesystem::path& file) {
   if (file.empty()) return;
-  tls_client_context({.certificate = {}, .key = {}, .authorities = {.option = option, .path = file}});
+  tls_client_context(
+      {.certificate = {}, .key = {}, .authorities = {.option = option, .path = file}});
 }
 
 TlsFiles::TlsFiles(std::filesystem::path certificate, std::filesystem::path key)
@@ -45,10 +46,9 @@ std::unique_ptr<ByteStream> TlsFiles::accept(int socket) const {
 }
 
 TlsContext TlsFiles::read() const {
-  return tls_server_context(
-      {.certificate = {.option = "tls-cert", .path = certificate_},
-       .key = {.option = "tls-key", .path = key_},
-       .authorities = {}});
+  return tls_server_context({.certificate = {.option = "tls-cert", .path = certificate_},
+                             .key = {.option = "tls-key", .path = key_},
+                             .authorities = {}});
 }
 
 }  // namespace isomesh::net

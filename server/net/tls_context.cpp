@@ -50,9 +50,9 @@ void load_certificate(SSL_CTX* context, const TlsIdentity& identity) {
   }
   if (SSL_CTX_use_PrivateKey_file(context, identity.key.path.c_str(), SSL_FILETYPE_PEM) != 1 ||
       SSL_CTX_check_private_key(context) != 1) {
-    throw invalid_parameter(identity.key.option,
-                            "must contain the key of the certificate of " +
-                                identity.certificate.option + " in PEM form, without a passphrase");
+    throw invalid_parameter(identity.key.option, "must contain the key of the certificate of " +
+                                                     identity.certificate.option +
+                                                     " in PEM form, without a passphrase");
   }
 }
 

@@ -107,13 +107,15 @@ std::string text_of(TlsFault fault, std::string_view peer) {
     case TlsFault::kMissing:
       return who + " has no certificate, but needs one of the authorities in ca-file";
     case TlsFault::kRefused:
-      return who + " refuses the certificate of isomeshd, or that it has none: check "
-                   "certificate-file, and which authorities are trusted there";
+      return who +
+             " refuses the certificate of isomeshd, or that it has none: check "
+             "certificate-file, and which authorities are trusted there";
     case TlsFault::kNotTls:
       return who + " does not use TLS on this port: use TLS on both sides, or on none";
     case TlsFault::kNoVersion:
-      return who + " accepts no version and cipher of TLS that isomeshd accepts: it must know "
-                   "TLS 1.2 with AES-GCM, or TLS 1.3";
+      return who +
+             " accepts no version and cipher of TLS that isomeshd accepts: it must know "
+             "TLS 1.2 with AES-GCM, or TLS 1.3";
     case TlsFault::kNone:
     case TlsFault::kOther:
       break;

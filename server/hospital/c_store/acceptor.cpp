@@ -142,8 +142,7 @@ void AssociationAcceptor::add(Descriptor peer, std::string party) {
       }
       // Edge-triggered, because received bytes stay in the socket.
       watch_or_throw(epoll_.number(), peer.number(), EPOLLIN | EPOLLRDHUP | EPOLLET, pending.id);
-      pending.request = {
-          .tls = std::move(tls), .peer = std::move(peer), .party = std::move(party)};
+      pending.request = {.tls = std::move(tls), .peer = std::move(peer), .party = std::move(party)};
       pending_.push_back(std::move(pending));
       by_id_.emplace(++last_id_, std::prev(pending_.end()));
       return;
@@ -187,8 +186,8 @@ void AssociationAcceptor::look_at(PendingList::iterator pending) {
 
 void AssociationAcceptor::begin_some() {
   for (auto pending = pending_.begin(); pending != pending_.end();) {
-    const bool is_over = pending->is_whole &&
-                         (has_hung_up(pending->request.peer.number()) || hooks_.begin(pending->request));
+    const bool is_over = pending->is_whole && (has_hung_up(pending->request.peer.number()) ||
+                                               hooks_.begin(pending->request));
     pending = is_over ? close(pending) : std::next(pending);
   }
 }

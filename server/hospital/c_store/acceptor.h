@@ -24,14 +24,14 @@ namespace isomesh::c_store {
 struct AssociationRequest {
   std::shared_ptr<TlsRelay> tls = {};  // null: the connection is not encrypted
   Descriptor peer = Descriptor();      // of TLS, its plain end; closed before the relay ends
-  std::string party;  // net::party_of its address
+  std::string party;                   // net::party_of its address
 };
 
 struct AcceptorLimits {
-  std::size_t most_pending = 128;                 // connections; addresses share them (FairPlaces)
+  std::size_t most_pending = 128;  // connections; addresses share them (FairPlaces)
   // From accepting to the complete request, with the handshake of TLS.
   std::chrono::milliseconds request_time{5'000};
-  std::chrono::milliseconds wait_time{60'000};    // for a place, from the complete request on
+  std::chrono::milliseconds wait_time{60'000};  // for a place, from the complete request on
 };
 
 // What the acceptor's thread calls.

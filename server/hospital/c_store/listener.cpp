@@ -115,18 +115,16 @@ DimseListener::DimseListener(const ListenerServices& services,
       entrance_(entrance_of(settings)),
       listener_(listen_address(settings)),
       places_(settings.associations, "associations"),
-      acceptor_(listener_.descriptor(), {.wait_time = settings.idle},
-                hooks()) {
+      acceptor_(listener_.descriptor(), {.wait_time = settings.idle}, hooks()) {
   for (std::size_t n = 0; n < settings_.associations; ++n) {
     threads_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
   }
 }
 
 AcceptorHooks DimseListener::hooks() {
-  AcceptorHooks hooks = {
-      .begin = [this](AssociationRequest& request) { return begin(request); },
-      .refused = [this](const std::string& party,
-                        net::TlsFault fault) { note_fault(party, fault); }};
+  AcceptorHooks hooks = {.begin = [this](AssociationRequest& request) { return begin(request); },
+                         .refused = [this](const std::string& party,
+                                           net::TlsFault fault) { note_fault(party, fault); }};
   if (entrance_) {
     hooks.encrypt = [this](Descriptor peer) { return entrance_->accept(std::move(peer)); };
   }
@@ -338,8 +336,8 @@ void DimseListener::note_transfers(const Transfers& transfers, const std::string
 void DimseListener::note_end(const DimseEnded& ended, const std::string& party) {
   if (ended.refusal == DimseRefusal::kCalled) note_rejection("called-title", ended, party);
   if (ended.refusal != DimseRefusal::kCalling) return;
-  const bool is_listed = std::ranges::find(settings_.calling, ended.calling) !=
-                         settings_.calling.end();
+  const bool is_listed =
+      std::ranges::find(settings_.calling, ended.calling) != settings_.calling.end();
   note_rejection(is_listed ? "certificate-name" : "calling-title", ended, party);
 }
 

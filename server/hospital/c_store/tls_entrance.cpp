@@ -14,9 +14,9 @@ std::string version_of(const net::TlsFile& file) {
   struct stat status = {};
   if (::stat(file.path.c_str(), &status) != 0) return "";
   std::string version;
-  for (const auto number : {static_cast<std::int64_t>(status.st_ino),
-                            static_cast<std::int64_t>(status.st_size), status.st_mtim.tv_sec,
-                            status.st_mtim.tv_nsec}) {
+  for (const auto number :
+       {static_cast<std::int64_t>(status.st_ino), static_cast<std::int64_t>(status.st_size),
+        status.st_mtim.tv_sec, status.st_mtim.tv_nsec}) {
     version += std::to_string(number) + ' ';
   }
   return version;

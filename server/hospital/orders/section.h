@@ -60,8 +60,9 @@ class Section {
   }
 
   template <class Number>
-  requires(std::is_integral_v<Number> && !std::is_same_v<Number, bool>)
-  void read(std::string_view key, Number& value, std::int64_t low, std::int64_t high) {
+  requires(std::is_integral_v<Number> &&
+           !std::is_same_v<Number, bool>) void read(std::string_view key, Number& value,
+                                                    std::int64_t low, std::int64_t high) {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const auto number = node->value_exact<std::int64_t>();
@@ -72,7 +73,8 @@ class Section {
     value = static_cast<Number>(*number);
   }
 
-  void read(std::string_view key, std::chrono::seconds& value, std::int64_t low, std::int64_t high) {
+  void read(std::string_view key, std::chrono::seconds& value, std::int64_t low,
+            std::int64_t high) {
     std::int64_t count = value.count();
     read(key, count, low, high);
     value = std::chrono::seconds(count);

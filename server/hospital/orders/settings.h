@@ -74,7 +74,7 @@ struct DimseSettings {
   std::filesystem::path ca_file;  // peers need a certificate of these authorities; empty: none
   // The name that the certificate of a calling title must have; titles without one may have any.
   std::map<std::string, std::string> certificate_names;
-  std::chrono::seconds idle{60};              // without any byte
+  std::chrono::seconds idle{60};  // without any byte
   std::uint64_t max_object_bytes = std::uint64_t{4} << 30;
   std::uint64_t max_held_bytes = std::uint64_t{100} << 30;  // received but not used by an order yet
 };

@@ -100,17 +100,17 @@ class TlsRelayTest : public testing::Test {
   TlsRelayTest() { std::signal(SIGPIPE, SIG_IGN); }
 
   std::unique_ptr<TlsRelay> server(Descriptor socket, const Certificate* clients) const {
-    return std::make_unique<TlsRelay>(std::make_unique<TlsStream>(
-        net::tls_server_context(identity_of(&server_, clients)).get(), socket.release(),
-        TlsStream::Side::kServer));
+    return std::make_unique<TlsRelay>(
+        std::make_unique<TlsStream>(net::tls_server_context(identity_of(&server_, clients)).get(),
+                                    socket.release(), TlsStream::Side::kServer));
   }
 
   std::unique_ptr<TlsRelay> client(Descriptor socket, const Certificate* own,
                                    const Certificate& trusted,
                                    const std::string& name = "server") const {
-    auto stream = std::make_unique<TlsStream>(
-        net::tls_client_context(identity_of(own, &trusted)).get(), socket.release(),
-        TlsStream::Side::kClient);
+    auto stream =
+        std::make_unique<TlsStream>(net::tls_client_context(identity_of(own, &trusted)).get(),
+                                    socket.release(), TlsStream::Side::kClient);
     net::expect_name(stream->ssl(), name);
     return std::make_unique<TlsRelay>(std::move(stream));
   }
