@@ -102,7 +102,8 @@ class OpenHospital {
                                   .audit = services.audit,
                                   .processes = *dimse_},
         *settings_.dimse);
-    log_info("receiving series by C-STORE on {}", listener_->authority());
+    log_info("receiving series by C-STORE on {}{}", listener_->authority(),
+             settings_.dimse->certificate_file.empty() ? "" : " over TLS");
   }
 
   orders::Orders& orders() { return orders_; }
@@ -256,6 +257,13 @@ http::ConfiguredFiles check(const std::filesystem::path& file) {
     files.emplace_back(name + "ca-file", pacs.ca_file);
     files.emplace_back(name + "password-file", pacs.password_file);
     files.emplace_back(name + "token-file", pacs.token_file);
+    files.emplace_back(name + "certificate-file", pacs.certificate_file);
+    files.emplace_back(name + "key-file", pacs.key_file);
+  }
+  if (const auto& dimse = hospital.dimse) {
+    files.emplace_back("dimse.certificate-file", dimse->certificate_file);
+    files.emplace_back("dimse.key-file", dimse->key_file);
+    files.emplace_back("dimse.ca-file", dimse->ca_file);
   }
   if (const auto& syslog = hospital.syslog) {
     files.emplace_back("audit.ca-file", syslog->ca_file);

@@ -8,8 +8,7 @@
 #include "base/mutex.h"
 #include "proto/error.h"
 #include "server/net/byte_stream.h"
-
-using SSL_CTX = struct ssl_ctx_st;  // NOLINT: OpenSSL's name
+#include "server/net/tls_context.h"
 
 namespace isomesh::net {
 
@@ -30,14 +29,12 @@ class TlsFiles {
   std::unique_ptr<ByteStream> accept(int socket) const;
 
  private:
-  using Context = std::shared_ptr<SSL_CTX>;
-
-  Context read() const;
+  TlsContext read() const;
 
   const std::filesystem::path certificate_;
   const std::filesystem::path key_;
   mutable Mutex mutex_;
-  Context context_ ISOMESH_GUARDED_BY(mutex_);
+  TlsContext context_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 }  // namespace isomesh::net

@@ -5,18 +5,17 @@
 #include <climits>
 #include <thread>
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <linux/sockios.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
-#include <openssl/x509v3.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 
 #include "proto/error.h"
 #include "server/net/connect.h"
+#include "server/net/tls_stream.h"
 
 namespace isomesh::audit {
 namespace {
@@ -26,49 +25,29 @@ namespace {
   throw Error(ErrorCode::kUnreachable, "the connection to the collector was lost");
 }
 
-bool is_address(const std::string& host) {
-  in6_addr address = {};
-  return ::inet_pton(AF_INET, host.c_str(), &address) == 1 ||
-         ::inet_pton(AF_INET6, host.c_str(), &address) == 1;
-}
-
 }  // namespace
 
 struct TlsClient::Session {
-  using Context = std::unique_ptr<SSL_CTX, decltype(&::SSL_CTX_free)>;
-  using Ssl = std::unique_ptr<SSL, decltype(&::SSL_free)>;
-
   Session(const TlsServer& server, int socket)
-      : context(SSL_CTX_new(TLS_client_method()), &::SSL_CTX_free), ssl(nullptr, &::SSL_free) {
-    if (!context) throw Error(ErrorCode::kInternal, "TLS is not available");
-    SSL_CTX_set_min_proto_version(context.get(), TLS1_2_VERSION);
-    SSL_CTX_set_verify(context.get(), SSL_VERIFY_PEER, nullptr);
-    SSL_CTX_set_mode(context.get(), SSL_MODE_AUTO_RETRY);
+      : context(net::tls_client_context(
+            {.certificate = {.option = "audit.certificate-file", .path = server.certificate},
+             .key = {.option = "audit.key-file", .path = server.key},
+             .authorities = {.option = "audit.ca-file", .path = server.authorities}})),
+        ssl(SSL_new(context.get()), &::SSL_free) {
     SSL_CTX_set_session_cache_mode(context.get(),
                                    SSL_SESS_CACHE_CLIENT | SSL_SESS_CACHE_NO_INTERNAL);
     SSL_CTX_sess_set_new_cb(context.get(), &Session::note_ticket);
-    load_files(server);
-    ssl.reset(SSL_new(context.get()));
     SSL_set_ex_data(ssl.get(), 0, this);
-    X509_VERIFY_PARAM* const parameters = SSL_get0_param(ssl.get());
-    if (is_address(server.host)) {
-      X509_VERIFY_PARAM_set1_ip_asc(parameters, server.host.c_str());
-    } else {
-      // As the macro SSL_set_tlsext_host_name, which has a C cast.
-      std::string name = server.host;
-      SSL_ctrl(ssl.get(), SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name, name.data());
-      X509_VERIFY_PARAM_set1_host(parameters, server.host.c_str(), server.host.size());
-    }
+    net::expect_name(ssl.get(), server.host);
     SSL_set_fd(ssl.get(), socket);
+    ERR_clear_error();
     if (SSL_connect(ssl.get()) == 1) {
       is_accepted = is_accepted || SSL_version(ssl.get()) < TLS1_3_VERSION;
       return;
     }
-    const bool is_stranger = SSL_get_verify_result(ssl.get()) != X509_V_OK;
+    const net::TlsFault fault = net::tls_fault_of(ssl.get());
     ERR_clear_error();
-    throw Error(ErrorCode::kUnreachable, is_stranger
-                                             ? "the collector's certificate is not trusted"
-                                             : "the TLS connection to the collector failed");
+    throw Error(ErrorCode::kUnreachable, net::text_of(fault, "the collector"));
   }
 
   Session(const Session&) = delete;
@@ -80,22 +59,8 @@ struct TlsClient::Session {
     return 0;  // OpenSSL keeps the ticket's ownership
   }
 
-  void load_files(const TlsServer& server) const {
-    const bool has_authorities =
-        server.authorities.empty()
-            ? SSL_CTX_set_default_verify_paths(context.get()) == 1
-            : SSL_CTX_load_verify_file(context.get(), server.authorities.c_str()) == 1;
-    const bool has_certificate =
-        server.certificate.empty() ||
-        (SSL_CTX_use_certificate_chain_file(context.get(), server.certificate.c_str()) == 1 &&
-         SSL_CTX_use_PrivateKey_file(context.get(), server.key.c_str(), SSL_FILETYPE_PEM) == 1);
-    ERR_clear_error();
-    if (has_authorities && has_certificate) return;
-    throw Error(ErrorCode::kInvalidParameter, "a certificate or key of [audit] cannot be read");
-  }
-
-  Context context;
-  Ssl ssl;
+  net::TlsContext context;
+  std::unique_ptr<SSL, decltype(&::SSL_free)> ssl;
   // The server has verified the client. A handshake of TLS 1.2 ends after that. One of TLS 1.3 ends
   // before it; the first session ticket comes after it.
   bool is_accepted = false;

@@ -35,13 +35,21 @@ constexpr std::uint32_t kLongestRequest = 1U << 20;
 // The association reads the rest.
 constexpr std::uint32_t kEnough = 32 * 1024;
 
-enum class Arrival { kPartly, kWhole, kNone };  // kNone: will not become a request
+constexpr unsigned char kTlsHandshake = 22;  // the first byte of a TLS connection
+
+enum class Arrival {
+  kPartly,
+  kWhole,
+  kTls,   // the peer starts TLS, but is not expected to
+  kNone,  // will not become a request
+};
 
 // Peeks without consuming received bytes.
 Arrival arrival_of(int peer) {
   std::array<unsigned char, kHeadBytes> head = {};
   const ssize_t count = ::recv(peer, head.data(), head.size(), MSG_PEEK | MSG_DONTWAIT);
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return Arrival::kPartly;
+  if (count > 0 && head[0] == kTlsHandshake) return Arrival::kTls;
   if (count <= 0 || head[0] != kAssociateRequest) return Arrival::kNone;
   if (static_cast<std::size_t>(count) < head.size()) return Arrival::kPartly;
   std::uint32_t length = 0;
@@ -60,10 +68,11 @@ bool has_hung_up(int peer) {
 
 }  // namespace
 
-AssociationAcceptor::AssociationAcceptor(int listening, const AcceptorLimits& limits, Begin begin)
+AssociationAcceptor::AssociationAcceptor(int listening, const AcceptorLimits& limits,
+                                         AcceptorHooks hooks)
     : listening_(listening),
       limits_(limits),
-      begin_(std::move(begin)),
+      hooks_(std::move(hooks)),
       epoll_(new_epoll()),
       places_(limits.most_pending, "connections"),
       last_id_(kWakeup) {
@@ -119,6 +128,7 @@ void AssociationAcceptor::accept_some() {
 }
 
 void AssociationAcceptor::add(Descriptor peer, std::string party) {
+  std::shared_ptr<TlsRelay> tls;
   while (true) {
     try {
       Pending pending = {.id = last_id_ + 1,
@@ -126,13 +136,18 @@ void AssociationAcceptor::add(Descriptor peer, std::string party) {
                          .place = places_.take(party),
                          .is_whole = false,
                          .deadline = Clock::now() + limits_.request_time};
+      if (hooks_.encrypt && !tls) {
+        tls = hooks_.encrypt(std::move(peer));
+        peer = tls->take_plain_end();
+      }
       // Edge-triggered, because received bytes stay in the socket.
       watch_or_throw(epoll_.number(), peer.number(), EPOLLIN | EPOLLRDHUP | EPOLLET, pending.id);
-      pending.request = {.peer = std::move(peer), .party = std::move(party)};
+      pending.request = {.tls = std::move(tls), .peer = std::move(peer), .party = std::move(party)};
       pending_.push_back(std::move(pending));
       by_id_.emplace(++last_id_, std::prev(pending_.end()));
       return;
     } catch (const Error& error) {
+      if (peer.number() < 0) return;  // TLS could not be started, and the connection is closed
       const bool has_share = error.code() == ErrorCode::kTooManyRequests;
       if (!make_room(has_share ? party : "")) return;
     }
@@ -153,7 +168,14 @@ bool AssociationAcceptor::make_room(const std::string& party) {
 void AssociationAcceptor::look_at(PendingList::iterator pending) {
   const int peer = pending->request.peer.number();
   const Arrival arrival = arrival_of(peer);
-  if (arrival == Arrival::kNone || has_hung_up(peer)) {
+  if (arrival == Arrival::kTls) {
+    hooks_.refused(pending->request.party, net::TlsFault::kNotTls);
+    close(pending);
+  } else if (arrival == Arrival::kNone || has_hung_up(peer)) {
+    const auto& tls = pending->request.tls;
+    if (tls && tls->fault() != net::TlsFault::kNone) {
+      hooks_.refused(pending->request.party, tls->fault());
+    }
     close(pending);
   } else if (arrival == Arrival::kWhole) {
     ::epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, peer, nullptr);
@@ -164,8 +186,8 @@ void AssociationAcceptor::look_at(PendingList::iterator pending) {
 
 void AssociationAcceptor::begin_some() {
   for (auto pending = pending_.begin(); pending != pending_.end();) {
-    const bool is_over = pending->is_whole &&
-                         (has_hung_up(pending->request.peer.number()) || begin_(pending->request));
+    const bool is_over = pending->is_whole && (has_hung_up(pending->request.peer.number()) ||
+                                               hooks_.begin(pending->request));
     pending = is_over ? close(pending) : std::next(pending);
   }
 }

@@ -8,38 +8,49 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <memory>
 #include <string>
 #include <thread>
 #include <unordered_map>
 
 #include "base/descriptor.h"
 #include "base/wakeup.h"
+#include "server/hospital/c_store/tls_relay.h"
 #include "server/net/fair_places.h"
 
 namespace isomesh::c_store {
 
 // A connection whose association request (PS3.8, A-ASSOCIATE-RQ) has arrived but is not read yet.
 struct AssociationRequest {
-  Descriptor peer = Descriptor();
-  std::string party;  // net::party_of its address
+  std::shared_ptr<TlsRelay> tls = {};  // null: the connection is not encrypted
+  Descriptor peer = Descriptor();      // of TLS, its plain end; closed before the relay ends
+  std::string party;                   // net::party_of its address
 };
 
 struct AcceptorLimits {
-  std::size_t most_pending = 128;                 // connections; addresses share them (FairPlaces)
-  std::chrono::milliseconds request_time{5'000};  // from accepting to the complete request
-  std::chrono::milliseconds wait_time{60'000};    // for a place, from the complete request on
+  std::size_t most_pending = 128;  // connections; addresses share them (FairPlaces)
+  // From accepting to the complete request, with the handshake of TLS.
+  std::chrono::milliseconds request_time{5'000};
+  std::chrono::milliseconds wait_time{60'000};  // for a place, from the complete request on
+};
+
+// What the acceptor's thread calls.
+struct AcceptorHooks {
+  // Takes the request and returns true, or leaves it waiting and returns false. Must not block. Is
+  // called for each waiting request, oldest first, and again soon.
+  std::function<bool(AssociationRequest& request)> begin;
+  // Is told why a connection will not become a request, if that is the peer's or our TLS.
+  std::function<void(const std::string& party, net::TlsFault fault)> refused;
+  // Starts TLS with an accepted connection; null: connections are not encrypted.
+  std::function<std::unique_ptr<TlsRelay>(Descriptor peer)> encrypt = nullptr;
 };
 
 class AssociationAcceptor {
  public:
-  // Takes the request and returns true, or leaves it waiting and returns false. Must not block. The
-  // acceptor's thread calls it for each waiting request, oldest first, and repeats that soon.
-  using Begin = std::function<bool(AssociationRequest& request)>;
-
   // `listening` is a listening socket; it stays the caller's, and is made non-blocking. If there is
   // no place for another connection, closes the oldest one whose request is incomplete, or else the
   // new one. Starts at once.
-  AssociationAcceptor(int listening, const AcceptorLimits& limits, Begin begin);
+  AssociationAcceptor(int listening, const AcceptorLimits& limits, AcceptorHooks hooks);
   ~AssociationAcceptor() { stop(); }  // as stop()
   AssociationAcceptor(const AssociationAcceptor&) = delete;
   AssociationAcceptor& operator=(const AssociationAcceptor&) = delete;
@@ -73,7 +84,7 @@ class AssociationAcceptor {
 
   const int listening_;
   const AcceptorLimits limits_;
-  const Begin begin_;
+  const AcceptorHooks hooks_;
   const Descriptor epoll_;
   Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;

@@ -69,6 +69,33 @@ std::vector<std::string> titles_of(const orders::DimseSettings& settings) {
   return titles;
 }
 
+std::optional<TlsEntrance> entrance_of(const orders::DimseSettings& settings) {
+  if (settings.certificate_file.empty()) return std::nullopt;
+  return TlsEntrance(net::TlsIdentity{
+      .certificate = {.option = "dimse.certificate-file", .path = settings.certificate_file},
+      .key = {.option = "dimse.key-file", .path = settings.key_file},
+      .authorities = {.option = "dimse.ca-file", .path = settings.ca_file}});
+}
+
+// When a connection last had bytes, and whether this side has sent some.
+struct Traffic {
+  bool has_answered = false;
+  std::chrono::milliseconds idle{0};
+};
+
+std::optional<Traffic> traffic_of(int peer, const TlsRelay* tls) {
+  if (tls != nullptr) {
+    return Traffic{.has_answered = tls->has_answered(),
+                   .idle = std::chrono::floor<std::chrono::milliseconds>(tls->idle())};
+  }
+  tcp_info info = {};
+  socklen_t size = sizeof info;
+  if (::getsockopt(peer, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
+  return Traffic{.has_answered = info.tcpi_data_segs_out != 0,
+                 .idle = std::chrono::milliseconds(
+                     std::min(info.tcpi_last_data_recv, info.tcpi_last_data_sent))};
+}
+
 }  // namespace
 
 net::Address listen_address(const orders::DimseSettings& settings) {
@@ -85,13 +112,33 @@ DimseListener::DimseListener(const ListenerServices& services,
                              const orders::DimseSettings& settings)
     : services_(services),
       settings_(settings),
+      entrance_(entrance_of(settings)),
       listener_(listen_address(settings)),
       places_(settings.associations, "associations"),
-      acceptor_(listener_.descriptor(), {.wait_time = settings.idle},
-                [this](AssociationRequest& request) { return begin(request); }) {
+      acceptor_(listener_.descriptor(), {.wait_time = settings.idle}, hooks()) {
   for (std::size_t n = 0; n < settings_.associations; ++n) {
     threads_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
   }
+}
+
+AcceptorHooks DimseListener::hooks() {
+  AcceptorHooks hooks = {.begin = [this](AssociationRequest& request) { return begin(request); },
+                         .refused = [this](const std::string& party,
+                                           net::TlsFault fault) { note_fault(party, fault); }};
+  if (entrance_) {
+    hooks.encrypt = [this](Descriptor peer) { return entrance_->accept(std::move(peer)); };
+  }
+  return hooks;
+}
+
+std::vector<std::string> DimseListener::calling_titles(const Association& association) const {
+  std::vector<std::string> titles = settings_.calling;
+  std::erase_if(titles, [&](const std::string& title) {
+    const auto name = settings_.certificate_names.find(title);
+    return name != settings_.certificate_names.end() &&
+           !(association.tls && association.tls->is_certified_as(name->second));
+  });
+  return titles;
 }
 
 void DimseListener::stop() {
@@ -108,6 +155,7 @@ bool DimseListener::begin(AssociationRequest& request) {
   try {
     auto association = std::make_shared<Association>();
     association->place = places_.take(request.party);
+    association->tls = std::move(request.tls);
     association->peer = std::move(request.peer);
     association->party = request.party;
     const Lock lock(mutex_);
@@ -149,15 +197,11 @@ bool DimseListener::is_idle(const Association& association, std::chrono::millise
   constexpr std::chrono::seconds kNoResponse{5};
   const Clock::time_point told = association.told;
   if (told == Clock::time_point() || association.is_storing) return false;
-  tcp_info info = {};
-  socklen_t size = sizeof info;
-  if (::getsockopt(association.peer.number(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) {
-    return false;
-  }
+  const auto traffic = traffic_of(association.peer.number(), association.tls.get());
+  if (!traffic) return false;
   idle = std::chrono::floor<std::chrono::milliseconds>(Clock::now() - told);
-  if (info.tcpi_data_segs_out == 0) return idle >= kNoResponse;
-  const auto moved = std::min(info.tcpi_last_data_recv, info.tcpi_last_data_sent);
-  idle = std::min(idle, std::chrono::milliseconds(moved));
+  if (!traffic->has_answered) return idle >= kNoResponse;
+  idle = std::min(idle, traffic->idle);
   return idle >= (association.has_sent ? kBetween : kBeforeTheFirst);
 }
 
@@ -208,7 +252,7 @@ void DimseListener::receive(Association& association, Transfers& transfers) {
   const store::ScratchFolder scratch(services_.folder.scratch());
   process::Child child = services_.processes.take(Clock::now() + settings_.idle, stop);
   child.send(dimse::to_line(dimse::DimseReceiving{.called = titles_of(settings_),
-                                                  .calling = settings_.calling,
+                                                  .calling = calling_titles(association),
                                                   .folder = scratch.path(),
                                                   .max_object_bytes = settings_.max_object_bytes,
                                                   .idle = settings_.idle}),
@@ -290,11 +334,25 @@ void DimseListener::note_transfers(const Transfers& transfers, const std::string
 }
 
 void DimseListener::note_end(const DimseEnded& ended, const std::string& party) {
-  if (ended.refusal != DimseRefusal::kCalled && ended.refusal != DimseRefusal::kCalling) return;
+  if (ended.refusal == DimseRefusal::kCalled) note_rejection("called-title", ended, party);
+  if (ended.refusal != DimseRefusal::kCalling) return;
+  const bool is_listed =
+      std::ranges::find(settings_.calling, ended.calling) != settings_.calling.end();
+  note_rejection(is_listed ? "certificate-name" : "calling-title", ended, party);
+}
+
+void DimseListener::note_fault(const std::string& party, net::TlsFault fault) {
+  note_rejection(entrance_ ? net::text_of(fault, "the peer")
+                           : "it uses TLS, but [dimse] has no certificate-file",
+                 {}, party);
+}
+
+void DimseListener::note_rejection(std::string_view reason, const DimseEnded& ended,
+                                   const std::string& party) {
   const auto unlisted = rejections_.permit();
   if (!unlisted) return;
   LogLine("association", LogLevel::kWarn)
-      .add("rejected", ended.refusal == DimseRefusal::kCalled ? "called-title" : "calling-title")
+      .add("rejected", reason)
       .add("peer", party)
       .add("unlisted", *unlisted);
   services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,

@@ -9,13 +9,16 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "base/mutex.h"
 #include "base/throttle.h"
 #include "server/hospital/c_store/acceptor.h"
+#include "server/hospital/c_store/tls_entrance.h"
 #include "server/hospital/dimse/message.h"
 #include "server/hospital/orders/settings.h"
 #include "server/hospital/records/received_store.h"
@@ -50,7 +53,8 @@ struct ListenerServices {
 // association that has been idle longest ends, if that is long enough.
 class DimseListener {
  public:
-  // Throws Error kInvalidParameter, or kUnavailable if it cannot listen on the address.
+  // Throws Error kInvalidParameter, also for its certificate files, or kUnavailable if it cannot
+  // listen on the address.
   DimseListener(const ListenerServices& services, const orders::DimseSettings& settings);
   // Ends the associations.
   ~DimseListener() { stop(); }
@@ -64,6 +68,7 @@ class DimseListener {
 
  private:
   struct Association {
+    std::shared_ptr<TlsRelay> tls;  // as in AssociationRequest
     Descriptor peer;
     std::string party;
     net::FairPlaces::Place place;
@@ -78,7 +83,10 @@ class DimseListener {
   // The number of stored objects by called title, calling title and study.
   using Transfers = std::map<std::array<std::string, 3>, std::uint64_t>;
 
+  AcceptorHooks hooks();
   bool begin(AssociationRequest& request);
+  // The titles that may send over this association.
+  std::vector<std::string> calling_titles(const Association& association) const;
   void make_room(const std::string& party);
   static bool is_idle(const Association& association, std::chrono::milliseconds& idle);
   void serve(const std::stop_token& stop);
@@ -89,11 +97,16 @@ class DimseListener {
                            const std::filesystem::path& folder);
   bool has_room(std::uint64_t more_bytes) const;
   void note_end(const dimse::DimseEnded& ended, const std::string& party);
+  void note_fault(const std::string& party, net::TlsFault fault);
+  // Adds a rejection, with its reason, to the log and the audit trail.
+  void note_rejection(std::string_view reason, const dimse::DimseEnded& ended,
+                      const std::string& party);
   // Adds what an association has stored to the audit trail.
   void note_transfers(const Transfers& transfers, const std::string& party);
 
   const ListenerServices services_;
   const orders::DimseSettings settings_;
+  std::optional<TlsEntrance> entrance_;  // empty: associations are not encrypted
   const net::Listener listener_;
   net::FairPlaces places_;
   Mutex mutex_;

@@ -1,5 +1,8 @@
 #include "server/hospital/c_store/sender.h"
 
+#include <memory>
+
+#include "server/hospital/c_store/tls_relay.h"
 #include "server/hospital/dimse/message.h"
 #include "server/hospital/objects/encapsulated_document.h"
 #include "server/net/connect.h"
@@ -53,6 +56,10 @@ void check_sent(const dimse::DimseSent& sent, std::string_view sop_class) {
     case DimseEnd::kNotAccepted:
       throw PacsFailure(PacsFault::kBusy,
                         "the PACS does not accept " + std::string(dicom::name_of_class(sop_class)));
+    case DimseEnd::kUnanswered:
+      throw PacsFailure(PacsFault::kUnreachable,
+                        "the PACS did not answer the request for an association: it may expect "
+                        "TLS, which tls = true switches on");
     case DimseEnd::kBroken:
       throw PacsFailure(PacsFault::kUnreachable, "the PACS ended the association");
     case DimseEnd::kTimeout:
@@ -98,6 +105,48 @@ Descriptor connected(const orders::PacsSettings& settings, const std::stop_token
   }
 }
 
+// Empty if the PACS is reached without TLS.
+std::unique_ptr<TlsRelay> encrypted(Descriptor& peer, const orders::PacsSettings& settings) {
+  if (!settings.tls) return nullptr;
+  try {
+    const net::TlsContext context = net::tls_client_context(
+        {.certificate = {.option = "certificate-file", .path = settings.certificate_file},
+         .key = {.option = "key-file", .path = settings.key_file},
+         .authorities = {.option = "ca-file", .path = settings.ca_file}});
+    auto stream = std::make_unique<net::TlsStream>(context.get(), peer.release(),
+                                                   net::TlsStream::Side::kClient);
+    const std::string& name =
+        settings.certificate_name.empty() ? settings.host : settings.certificate_name;
+    if (name != "*") net::expect_name(stream->ssl(), name);
+    auto relay = std::make_unique<TlsRelay>(std::move(stream));
+    peer = relay->take_plain_end();
+    return relay;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInvalidParameter) throw;
+    throw PacsFailure(PacsFault::kUnauthorized,
+                      std::string("TLS with the PACS cannot be started: ") + error.what());
+  }
+}
+
+// Throws if an association ended because of its TLS.
+void check_encryption(const TlsRelay& tls, DimseEnd end) {
+  const net::TlsFault fault = tls.fault();
+  if (fault != net::TlsFault::kNone) {
+    throw PacsFailure(
+        fault == net::TlsFault::kRefused ? PacsFault::kUnauthorized : PacsFault::kUnreachable,
+        net::text_of(fault, "the PACS"));
+  }
+  if (tls.has_ended_silently()) {
+    throw PacsFailure(PacsFault::kUnreachable,
+                      "the PACS ended the TLS connection before it answered: it may refuse the "
+                      "certificate of isomeshd, or not use TLS on this port");
+  }
+  if (end == DimseEnd::kUnanswered) {
+    throw PacsFailure(PacsFault::kUnreachable,
+                      "the PACS did not answer the request for an association");
+  }
+}
+
 }  // namespace
 
 void Sender::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
@@ -111,14 +160,17 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
       .instance = object.place.instance,
       .timeout = settings_.timeout,
       .response_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
-  const Descriptor peer = connected(settings_, stop);
+  Descriptor peer = connected(settings_, stop);
+  const std::unique_ptr<TlsRelay> tls = encrypted(peer, settings_);
   process::Child child =
       processes_.take(std::chrono::steady_clock::now() + settings_.timeout, stop);
   child.send(dimse::to_line(order), peer.number());
+  peer = Descriptor();  // so that TLS ends when the process ends
   const process::Output output =
       child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
   const dimse::DimseSent sent = sent_of(output, child);
   if (sent.end == DimseEnd::kUnreadable) processes_.renew();
+  if (tls && sent.end != DimseEnd::kResponded) check_encryption(*tls, sent.end);
   check_sent(sent, object.sop_class);
 }
 

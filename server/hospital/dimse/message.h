@@ -47,7 +47,8 @@ enum class DimseEnd {
   kRejected,     // the association, for example because of an unknown title
   kBusy,         // the association, temporarily
   kNotAccepted,  // presentation context of the object's class
-  kBroken,       // the connection ended
+  kUnanswered,   // the peer ended the connection, or sent no DICOM, in place of an association
+  kBroken,       // the connection ended later
   kTimeout,
   kUnreadable,  // malformed response
 };

@@ -48,6 +48,14 @@ DimseEnd end_of(const OFCondition& condition) {
   return DimseEnd::kUnreadable;
 }
 
+// Why there is no association. A peer that expects TLS ends the connection, or answers with an
+// alert, of which the type is that of no PDU.
+DimseEnd end_of_request(const OFCondition& condition) {
+  if (condition.code() == DULC_UNRECOGNIZEDPDUTYPE) return DimseEnd::kUnanswered;
+  const DimseEnd end = end_of(condition);
+  return end == DimseEnd::kBroken ? DimseEnd::kUnanswered : end;
+}
+
 // Proposes the object's own transfer syntax and the default one that every peer must support.
 OFCondition propose(const dimse::DimseSending& order, T_ASC_Parameters* parameters) {
   std::array<const char*, 1> own = {UID_LittleEndianExplicitTransferSyntax};
@@ -113,7 +121,7 @@ DimseSent send_object(const dimse::DimseSending& order) {
                                 timeout);
   const Association held_association(association);
   if (done == DUL_ASSOCIATIONREJECTED) return {.end = end_of_rejection(parameters), .status = 0};
-  if (done.bad()) return {.end = end_of(done), .status = 0};
+  if (done.bad()) return {.end = end_of_request(done), .status = 0};
   const auto context = accepted_context(association, order.sop_class);
   if (context == 0) {
     ASC_releaseAssociation(association);

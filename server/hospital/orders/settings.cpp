@@ -1,7 +1,6 @@
 #include "server/hospital/orders/settings.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <set>
 #include <sstream>
@@ -13,126 +12,12 @@
 #include "proto/dicom_uid.h"
 #include "proto/error.h"
 #include "server/hospital/dimse/message.h"
+#include "server/hospital/orders/section.h"
 
 namespace isomesh::orders {
 namespace {
 
 using std::chrono::seconds;
-
-[[noreturn]] void refuse(const std::string& key, const std::string& message) {
-  throw invalid_parameter(key, message);
-}
-
-// A table of the file. Keys that remain after all known ones were read are errors.
-class Section {
- public:
-  Section(const toml::table& table, std::string name) : table_(table), name_(std::move(name)) {}
-
-  std::string key_of(std::string_view key) const {
-    return name_.empty() ? std::string(key) : name_ + '.' + std::string(key);
-  }
-
-  const toml::node* find(std::string_view key) {
-    known_.emplace(key);
-    return table_.get(key);
-  }
-
-  void read(std::string_view key, std::string& value) {
-    const toml::node* node = find(key);
-    if (node == nullptr) return;
-    const auto text = node->value_exact<std::string>();
-    if (!text || has_control_characters(*text)) refuse(key_of(key), "must be a string on one line");
-    value = *text;
-  }
-
-  void read(std::string_view key, std::filesystem::path& value) {
-    std::string text;
-    read(key, text);
-    if (!text.empty()) value = text;
-  }
-
-  template <class Number>
-  requires std::is_integral_v<Number>
-  void read(std::string_view key, Number& value, std::int64_t low, std::int64_t high) {
-    const toml::node* node = find(key);
-    if (node == nullptr) return;
-    const auto number = node->value_exact<std::int64_t>();
-    if (!number || *number < low || *number > high) {
-      refuse(key_of(key),
-             "must be a whole number from " + std::to_string(low) + " to " + std::to_string(high));
-    }
-    value = static_cast<Number>(*number);
-  }
-
-  void read(std::string_view key, seconds& value, std::int64_t low, std::int64_t high) {
-    std::int64_t count = value.count();
-    read(key, count, low, high);
-    value = seconds(count);
-  }
-
-  // Reads a number of millimetres greater than 0.
-  void read(std::string_view key, std::optional<double>& value) {
-    const toml::node* node = find(key);
-    if (node == nullptr) return;
-    value = node->is_number() ? node->value<double>() : std::nullopt;
-    if (!value || !std::isfinite(*value) || !(*value > 0)) {
-      refuse(key_of(key), "must be a number above 0");
-    }
-  }
-
-  void read(std::string_view key, std::vector<std::string>& values) {
-    const toml::node* node = find(key);
-    if (node == nullptr) return;
-    const toml::array* list = node->as_array();
-    if (list == nullptr) refuse(key_of(key), "must be a list of strings");
-    for (const toml::node& each : *list) {
-      const auto text = each.value_exact<std::string>();
-      if (!text) refuse(key_of(key), "must be a list of strings");
-      values.push_back(*text);
-    }
-  }
-
-  // Empty if the section is missing.
-  std::optional<Section> section(std::string_view key) {
-    const toml::node* node = find(key);
-    if (node == nullptr) return std::nullopt;
-    const toml::table* table = node->as_table();
-    if (table == nullptr) refuse(key_of(key), "must be a table");
-    return Section(*table, key_of(key));
-  }
-
-  std::vector<Section> sections(std::string_view key) {
-    std::vector<Section> all;
-    const toml::node* node = find(key);
-    if (node == nullptr) return all;
-    const toml::array* list = node->as_array();
-    if (list == nullptr) refuse(key_of(key), "must be a list of tables");
-    for (std::size_t i = 0; i < list->size(); ++i) {
-      const toml::table* table = list->get(i)->as_table();
-      if (table == nullptr) refuse(key_of(key), "must be a list of tables");
-      all.emplace_back(*table, key_of(key) + '[' + std::to_string(i) + ']');
-    }
-    return all;
-  }
-
-  const toml::table& table() const { return table_; }
-
-  void require(std::string_view key, const std::string& value) const {
-    if (value.empty()) refuse(key_of(key), "is required");
-  }
-
-  // Call after reading all known keys.
-  void finish() const {
-    for (const auto& [key, unused] : table_) {
-      if (!known_.contains(key.str())) refuse(key_of(key.str()), "is not a known key");
-    }
-  }
-
- private:
-  const toml::table& table_;
-  std::string name_;
-  std::set<std::string, std::less<>> known_;
-};
 
 constexpr std::int64_t kMostSeconds = 30 * 24 * 3600;
 
@@ -169,6 +54,31 @@ void check_name(const Section& section, const std::string& name) {
 void check_title(const std::string& key, const std::string& title) {
   if (!dimse::is_ae_title(title)) {
     refuse(key, "must be 1 to 16 printable ASCII characters without a backslash");
+  }
+}
+
+// Reads a certificate and its key, of which neither works without the other.
+void read_certificate(Section& section, std::filesystem::path& certificate,
+                      std::filesystem::path& key) {
+  section.read("certificate-file", certificate);
+  section.read("key-file", key);
+  if (certificate.empty() != key.empty()) {
+    refuse(section.key_of("certificate-file"), "must be given together with key-file");
+  }
+}
+
+void read_tls(Section& section, PacsSettings& pacs) {
+  section.read("tls", pacs.tls);
+  section.read("certificate-name", pacs.certificate_name);
+  read_certificate(section, pacs.certificate_file, pacs.key_file);
+  if (pacs.tls) {
+    if (pacs.send_by != SendBy::kCStore) {
+      refuse(section.key_of("tls"), "is for send-by = \"c-store\"; dicomweb has https://");
+    }
+    return;
+  }
+  if (!pacs.certificate_name.empty() || !pacs.certificate_file.empty()) {
+    refuse(section.key_of("tls"), "must be true if certificate-name or certificate-file is given");
   }
 }
 
@@ -222,6 +132,7 @@ PacsSettings read_pacs(Section section) {
     refuse(section.key_of("transfer-syntax"), "must be * or the UID of a transfer syntax");
   }
   read_send_by(section, pacs);
+  read_tls(section, pacs);
   section.read("max-send-bytes", pacs.max_send_bytes, 1, 4'294'967'294);
   section.read("owners", pacs.owners);
   section.finish();
@@ -310,6 +221,27 @@ Rule read_rule(Section section) {
   return rule;
 }
 
+void read_encryption(Section& section, DimseSettings& dimse) {
+  read_certificate(section, dimse.certificate_file, dimse.key_file);
+  section.read("ca-file", dimse.ca_file);
+  if (!dimse.ca_file.empty() && dimse.certificate_file.empty()) {
+    refuse(section.key_of("ca-file"), "is for TLS, which needs certificate-file and key-file");
+  }
+  auto names = section.section("certificate-names");
+  if (!names) return;
+  if (dimse.ca_file.empty()) {
+    refuse(section.key_of("certificate-names"), "needs ca-file, the authorities of certificates");
+  }
+  for (const auto& [title, unused] : names->table()) {
+    const std::string calling(title.str());
+    if (std::ranges::find(dimse.calling, calling) == dimse.calling.end()) {
+      refuse(names->key_of(calling), "is not a title in calling");
+    }
+    names->read(calling, dimse.certificate_names[calling]);
+    names->require(calling, dimse.certificate_names[calling]);
+  }
+}
+
 DimseSettings read_dimse(Section section) {
   DimseSettings dimse;
   section.read("listen", dimse.listen);
@@ -329,6 +261,7 @@ DimseSettings read_dimse(Section section) {
     check_title(routes->key_of(title.str()), std::string(title.str()));
     routes->read(title.str(), dimse.routes[std::string(title.str())]);
   }
+  read_encryption(section, dimse);
   section.finish();
   return dimse;
 }
@@ -338,13 +271,9 @@ std::optional<SyslogSettings> read_audit(Section section) {
   std::string url;
   section.read("syslog", url);
   section.read("ca-file", syslog.ca_file);
-  section.read("certificate-file", syslog.certificate_file);
-  section.read("key-file", syslog.key_file);
+  read_certificate(section, syslog.certificate_file, syslog.key_file);
   section.finish();
   section.require("syslog", url);
-  if (syslog.certificate_file.empty() != syslog.key_file.empty()) {
-    refuse(section.key_of("certificate-file"), "must be given together with key-file");
-  }
   constexpr std::string_view kScheme = "tls://";
   const std::size_t colon = url.rfind(':');
   const bool has_port = colon != std::string::npos && colon >= kScheme.size();

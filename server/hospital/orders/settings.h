@@ -31,6 +31,10 @@ struct PacsSettings {
   std::string calling_aet = "ISOMESH";
   std::string host;
   std::uint16_t port = 0;
+  bool tls = false;                        // for C-STORE, as the next three
+  std::string certificate_name;            // that the PACS must have; empty: the host, "*": any
+  std::filesystem::path certificate_file;  // client certificate; empty: none
+  std::filesystem::path key_file;
   std::uint64_t max_send_bytes = 4'000'000'000;
   std::vector<std::string> owners;  // may order from it without a rule; empty: everybody
 };
@@ -65,7 +69,12 @@ struct DimseSettings {
   std::size_t associations = 8;               // simultaneous; further ones wait
   std::map<std::string, std::string> routes;  // AE title that series are sent to -> rule
   std::vector<std::string> calling;           // AE titles that may send
-  std::chrono::seconds idle{60};              // without any byte
+  std::filesystem::path certificate_file;     // empty: no TLS
+  std::filesystem::path key_file;
+  std::filesystem::path ca_file;  // peers need a certificate of these authorities; empty: none
+  // The name that the certificate of a calling title must have; titles without one may have any.
+  std::map<std::string, std::string> certificate_names;
+  std::chrono::seconds idle{60};  // without any byte
   std::uint64_t max_object_bytes = std::uint64_t{4} << 30;
   std::uint64_t max_held_bytes = std::uint64_t{100} << 30;  // received but not used by an order yet
 };

@@ -51,7 +51,7 @@ TEST(DimseMessage, ReportsThatWouldDoHarmAreRefused) {
     EXPECT_EQ(error.code(), ErrorCode::kInternal);
   }
   for (const char* line :
-       {"", "{}", "[]", R"({"sent":{"end":7,"status":0}})", R"({"sent":{"end":0,"status":-1}})",
+       {"", "{}", "[]", R"({"sent":{"end":8,"status":0}})", R"({"sent":{"end":0,"status":-1}})",
         R"({"sent":{"end":0,"status":65536}})", R"({"sent":{"end":-1,"status":0}})",
         R"({"sent":{"end":0}})", R"({"sent":{"end":0,"status":1.5}})", R"({"ended":{"refusal":4}})",
         R"({"ended":{"refusal":"x"}})"}) {

@@ -85,6 +85,12 @@ std::string with(const std::string& from, const std::string& to) {
   return text.replace(text.find(from), from.size(), to);
 }
 
+const std::string kSend = "send-by = \"c-store\"\naet = \"A\"\nhost = \"h\"\nport = 104\n";
+const std::string kReceive = std::string(kWhole) +
+                             "[dimse]\nlisten = \"h:1\"\ncalling = [\"A\"]\n"
+                             "routes = { B = \"bone\" }\n";
+const std::string kSecure = "certificate-file = \"c\"\nkey-file = \"k\"\nca-file = \"a\"\n";
+
 TEST(HospitalSettings, NamesWhatIsWrong) {
   const std::vector<std::pair<std::string, std::string>> wrong = {
       {"", "pacs"},
@@ -116,6 +122,12 @@ TEST(HospitalSettings, NamesWhatIsWrong) {
             "send-by = \"c-store\"\naet = \"12345678901234567\"\nhost = \"h\"\nport = 104"),
        "pacs[0].aet: must be 1 to 16"},
       {with("dicomweb = \"https://pacs.example.org/dicom-web/\"", ""), "pacs[0].dicomweb"},
+      {with("send-by = \"stow\"", "tls = true"), "pacs[0].tls: is for send-by"},
+      {with("send-by = \"stow\"", "tls = \"yes\""), "pacs[0].tls: must be true or false"},
+      {with("send-by = \"stow\"", kSend + "certificate-name = \"x\""),
+       "pacs[0].tls: must be true if"},
+      {with("send-by = \"stow\"", kSend + "tls = true\nkey-file = \"k\""),
+       "pacs[0].certificate-file: must be given together"},
       {std::string(kWhole) + "max-error-mm = 0\n", "rules[0].max-error-mm"},
       {std::string(kWhole) + "worklist = \"main\"\n", "rules[0].procedures"},
       {std::string(kWhole) + "worklist = \"main\"\nprocedures = [\"MESH\"]\n",
@@ -136,6 +148,13 @@ TEST(HospitalSettings, NamesWhatIsWrong) {
       {std::string(kWhole) +
            "[dimse]\nlisten = \"h:1\"\ncalling = [\"A\"]\nroutes = { B = \"other\" }\n",
        "dimse.routes.B: names the rule \"other\""},
+      {kReceive + "key-file = \"k\"\n", "dimse.certificate-file: must be given together"},
+      {kReceive + "ca-file = \"k\"\n", "dimse.ca-file: is for TLS"},
+      {kReceive + "certificate-names = { A = \"a\" }\n", "dimse.certificate-names: needs ca-file"},
+      {kReceive + kSecure + "certificate-names = { C = \"c\" }\n",
+       "dimse.certificate-names.C: is not a title in calling"},
+      {kReceive + kSecure + "certificate-names = { A = \"\" }\n",
+       "dimse.certificate-names.A: is required"},
       {std::string(kWhole) + "[[pacs]]\nname = \"main\"\ndicomweb = \"http://x\"\n", "twice"},
   };
   for (const auto& [toml, name] : wrong) EXPECT_THAT(refusal_of(toml), HasSubstr(name)) << toml;
@@ -150,6 +169,11 @@ aet = "ARCHIVE"
 calling-aet = "MESHES"
 host = "archive.example.org"
 port = 11112
+tls = true
+ca-file = "pacs.pem"
+certificate-name = "*"
+certificate-file = "client.pem"
+key-file = "client.key"
 [[rules]]
 name = "bone"
 max-error-mm = 0.3
@@ -163,6 +187,10 @@ calling = ["CT1", "ROUTER"]
 idle-seconds = 7
 max-object-bytes = 8
 max-held-bytes = 9
+certificate-file = "server.pem"
+key-file = "server.key"
+ca-file = "peers.pem"
+certificate-names = { CT1 = "ct1.example.org" }
 [audit]
 syslog = "tls://collector.example.org:16514"
 ca-file = "/etc/isomesh/ca.pem"
@@ -176,6 +204,11 @@ key-file = "/etc/isomesh/key.pem"
   EXPECT_EQ(pacs.host, "archive.example.org");
   EXPECT_EQ(pacs.port, 11112);
   EXPECT_EQ(pacs.dicomweb, "");
+  EXPECT_TRUE(pacs.tls);
+  EXPECT_EQ(pacs.ca_file, "pacs.pem");
+  EXPECT_EQ(pacs.certificate_name, "*");
+  EXPECT_EQ(pacs.certificate_file, "client.pem");
+  EXPECT_EQ(pacs.key_file, "client.key");
   EXPECT_EQ(hospital.rules.front().max_error_mm, 0.3);
   ASSERT_TRUE(hospital.dimse);
   EXPECT_EQ(hospital.dimse->listen, "127.0.0.1:11112");
@@ -186,6 +219,11 @@ key-file = "/etc/isomesh/key.pem"
   EXPECT_EQ(hospital.dimse->idle, std::chrono::seconds(7));
   EXPECT_EQ(hospital.dimse->max_object_bytes, 8U);
   EXPECT_EQ(hospital.dimse->max_held_bytes, 9U);
+  EXPECT_EQ(hospital.dimse->certificate_file, "server.pem");
+  EXPECT_EQ(hospital.dimse->key_file, "server.key");
+  EXPECT_EQ(hospital.dimse->ca_file, "peers.pem");
+  EXPECT_EQ(hospital.dimse->certificate_names,
+            (std::map<std::string, std::string>{{"CT1", "ct1.example.org"}}));
   ASSERT_TRUE(hospital.syslog);
   EXPECT_EQ(hospital.syslog->host, "collector.example.org");
   EXPECT_EQ(hospital.syslog->port, 16514);
