@@ -359,6 +359,15 @@ std::optional<SyslogSettings> read_audit(Section section) {
   return syslog;
 }
 
+WorklistSettings read_own_worklist(Section section) {
+  WorklistSettings worklist;
+  section.read("requesters", worklist.requesters);
+  section.read("performers", worklist.performers);
+  section.read("max-workitems", worklist.most, 1, 100'000);
+  section.finish();
+  return worklist;
+}
+
 // Checks that names are unique and that all references exist.
 void check_names(const HospitalSettings& settings) {
   std::set<std::string> names;
@@ -406,8 +415,11 @@ HospitalSettings settings_of(const toml::table& table) {
   for (Section& section : all.sections("rules")) settings.rules.push_back(read_rule(section));
   if (auto dimse = all.section("dimse")) settings.dimse = read_dimse(std::move(*dimse));
   if (auto audit = all.section("audit")) settings.syslog = read_audit(std::move(*audit));
+  if (auto own = all.section("worklist")) settings.worklist = read_own_worklist(std::move(*own));
   all.finish();
-  if (settings.pacs.empty()) refuse("pacs", "is required: orders need a PACS");
+  if (settings.pacs.empty() && !settings.worklist) {
+    refuse("pacs", "is required: orders need a PACS");
+  }
   check_names(settings);
   return settings;
 }

@@ -79,6 +79,13 @@ struct SyslogSettings {
   std::filesystem::path key_file;
 };
 
+// The own worklist, for workitems that others perform, or this daemon.
+struct WorklistSettings {
+  std::vector<std::string> requesters;  // may create and cancel workitems; empty: everybody
+  std::vector<std::string> performers;  // may claim and perform them; empty: everybody
+  std::size_t most = 10'000;            // workitems
+};
+
 struct HospitalSettings {
   std::chrono::seconds settle{60};  // a series' list of instances must be unchanged for this long
   std::chrono::seconds poll{30};
@@ -91,6 +98,7 @@ struct HospitalSettings {
   std::vector<Rule> rules;
   std::optional<DimseSettings> dimse;
   std::optional<SyslogSettings> syslog;
+  std::optional<WorklistSettings> worklist;
 
   // Null if there is no PACS with that name.
   const PacsSettings* find_pacs(std::string_view name) const;
