@@ -110,7 +110,4 @@ struct HospitalSettings {
 HospitalSettings read_settings(const std::filesystem::path& file);
 HospitalSettings parse_settings(std::string_view toml);
 
-// True if the text matches the pattern: see SeriesMatch.
-bool matches(std::string_view pattern, std::string_view text);
-
 }  // namespace isomesh::orders

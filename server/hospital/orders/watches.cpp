@@ -8,6 +8,7 @@
 #include "base/log.h"
 #include "server/hospital/objects/uid.h"
 #include "server/hospital/orders/orders.h"
+#include "server/hospital/orders/pattern.h"
 
 namespace isomesh::orders {
 namespace {

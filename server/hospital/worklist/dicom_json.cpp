@@ -4,6 +4,7 @@
 #include <array>
 
 #include "base/error.h"
+#include "proto/json_text.h"
 
 namespace isomesh::worklist {
 namespace {
@@ -23,7 +24,7 @@ constexpr std::array<std::string_view, 34> kRepresentations = {
   throw invalid_parameter(tag, message);
 }
 
-json parse_json(std::string_view text) {
+json bounded_json(std::string_view text) {
   const auto check_depth = [](int depth, json::parse_event_t /*event*/, json& /*parsed*/) {
     if (depth > kDeepest) {
       throw Error(ErrorCode::kInvalidParameter, "the data set is nested too deeply");
@@ -31,7 +32,7 @@ json parse_json(std::string_view text) {
     return true;
   };
   try {
-    return json::parse(text.begin(), text.end(), check_depth);
+    return parse_json<json>(text, json::parser_callback_t(check_depth));
   } catch (const json::exception&) {
     throw Error(ErrorCode::kInvalidParameter,
                 "the body must be a data set of the DICOM JSON Model, but is not valid JSON");
@@ -106,7 +107,7 @@ DataSet checked(const json& object) {
 }  // namespace
 
 DataSet parse_data_set(std::string_view text) {
-  json body = parse_json(text);
+  json body = bounded_json(text);
   if (body.is_array() && body.size() == 1) body = json(std::move(body.front()));
   if (!body.is_object()) {
     throw Error(ErrorCode::kInvalidParameter,

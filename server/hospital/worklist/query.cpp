@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "server/hospital/orders/settings.h"
+#include "server/hospital/orders/pattern.h"
 #include "server/hospital/worklist/workitem.h"
 
 namespace isomesh::worklist {
