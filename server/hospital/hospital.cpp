@@ -1,6 +1,7 @@
 #include "server/hospital/hospital.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -19,7 +20,9 @@
 #include "server/hospital/records/order_store.h"
 #include "server/hospital/records/received_store.h"
 #include "server/hospital/records/tables.h"
+#include "server/hospital/records/workitem_store.h"
 #include "server/hospital/routes.h"
+#include "server/hospital/worklist_routes.h"
 #include "server/jobs/library/import_runner.h"
 #include "server/process/prepared.h"
 
@@ -70,6 +73,7 @@ class OpenHospital {
       : settings_(orders::read_settings(settings.file)),
         order_store_(services.records, services.has_task),
         received_(services.records),
+        workitems_(services.records),
         responses_(response_runner(settings)),
         dimse_(prepare_dimse(settings_, settings)),
         peers_(peers(settings, services)),
@@ -88,11 +92,16 @@ class OpenHospital {
                 {.keep = settings.keep,
                  .believed_now = services.believed_now,
                  .keep_orders = services.keep_task,
-                 .cut_off = [this, &services] {
-                   responses_.stop();
-                   if (dimse_) dimse_->stop();
-                   services.library.stop_imports();
-                 }}) {
+                 .cut_off =
+                     [this, &services] {
+                       responses_.stop();
+                       if (dimse_) dimse_->stop();
+                       services.library.stop_imports();
+                     },
+                 .forget_also = [this](store::Time before) { return workitems_.forget(before); }}) {
+    if (settings_.worklist) {
+      worklist_.emplace(OwnWorklist{.settings = *settings_.worklist, .workitems = workitems_});
+    }
     if (!settings_.dimse) return;
     listener_ = std::make_unique<c_store::DimseListener>(
         c_store::ListenerServices{.folder = services.folder,
@@ -107,6 +116,8 @@ class OpenHospital {
   }
 
   orders::Orders& orders() { return orders_; }
+  // Null if it is not configured.
+  const OwnWorklist* worklist() const { return worklist_ ? &*worklist_ : nullptr; }
 
   void begin_drain() {
     if (listener_) listener_->stop();
@@ -151,11 +162,13 @@ class OpenHospital {
   const orders::HospitalSettings settings_;
   store::OrderStore order_store_;
   store::ReceivedStore received_;
+  store::WorkitemStore workitems_;
   jobs::ImportRunner responses_;
   std::unique_ptr<process::PreparedProcesses> dimse_;
   const orders::Peers peers_;
   std::unique_ptr<audit::SyslogSender> audit_;
   orders::Orders orders_;
+  std::optional<OwnWorklist> worklist_;
   std::unique_ptr<c_store::DimseListener> listener_;  // null if no series are received
 };
 
@@ -205,6 +218,7 @@ class HospitalWing final : public http::Wing {
 
   void add_routes(http::App& app) override {
     add_order_routes(app, hospital_ ? &hospital_->orders() : nullptr);
+    add_worklist_routes(app, hospital_ ? hospital_->worklist() : nullptr);
   }
 
   std::optional<bool> has_ended(const std::string& id) const override {

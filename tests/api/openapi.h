@@ -24,7 +24,7 @@ class HospitalFile {
  public:
   HospitalFile() {
     write_file(folder_ / "hospital.toml",
-               "[[pacs]]\nname = \"absent\"\ndicomweb = \"http://127.0.0.1:1/\"\n");
+               "[worklist]\n[[pacs]]\nname = \"absent\"\ndicomweb = \"http://127.0.0.1:1/\"\n");
   }
   std::string path() const { return folder_ / "hospital.toml"; }
 
@@ -45,6 +45,7 @@ class OpenApiTest : public testing::Test {
     if (path_item["post"]) methods.insert("POST");
     if (path_item["delete"]) methods.insert("DELETE");
     if (path_item["patch"]) methods.insert("PATCH");
+    if (path_item["put"]) methods.insert("PUT");
     return methods;
   }
 
@@ -53,7 +54,7 @@ class OpenApiTest : public testing::Test {
     const std::string& id = path.starts_with("/v1/volumes")  ? job_.parameters.volume
                             : path.starts_with("/v1/orders") ? order_.id
                                                              : job_.id;
-    return replaced(replaced(path, "{format}", "drc"), "{id}", id);
+    return replaced(replaced(replaced(path, "{format}", "drc"), "{id}", id), "{uid}", "1.2.3");
   }
 
   // An order that waits for a PACS which does not answer.

@@ -99,6 +99,10 @@ Event event_of(const std::string& code, bool is_login) {
     const Code node = {"110126", "DCM", "Node Authentication"};
     return {"E", {"110114", "DCM", "User Authentication"}, is_login ? login : node};
   }
+  if (code == "110113") {
+    const Code restricted = {"110132", "DCM", "Use of Restricted Function"};
+    return {"E", {"110113", "DCM", "Security Alert"}, restricted};
+  }
   throw Error(ErrorCode::kInternal, "has an unknown event");
 }
 
@@ -107,16 +111,16 @@ struct Content {
   std::string objects = {};
 };
 
-// Somebody read data of a patient over HTTP, or could not log in.
+// Somebody read data of a patient over HTTP, could not log in, or tried what is not allowed.
 Content content_of_request(const Json& entry, const std::string& what, const AuditSource& source) {
   const std::string address = text_of(entry, "peer");
   const std::string caller = text_of(entry, "caller");
   const std::string& user = caller.empty() ? address : caller;
-  const bool is_login = what == "login";
-  return {
-      participant(user.empty() ? "unix" : user, true, is_login ? nullptr : &kDestination, address) +
-          participant(source.station, false, is_login ? nullptr : &kSource),
-      study_object(entry) + patient_object(entry)};
+  const bool is_refused = what == "login" || what == "permission";
+  return {participant(user.empty() ? "unix" : user, true, is_refused ? nullptr : &kDestination,
+                      address) +
+              participant(source.station, false, is_refused ? nullptr : &kSource),
+          study_object(entry) + patient_object(entry)};
 }
 
 Content content_of(const Json& entry, const std::string& code, const AuditSource& source) {

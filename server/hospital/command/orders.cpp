@@ -32,6 +32,7 @@ struct OrderOptions {
   std::string rule;
   std::string parameters;  // JSON
   std::vector<std::string> send;
+  std::string label_volume;
   bool sends_nothing = false;
   std::optional<Priority> priority = {};
   bool does_not_wait = false;
@@ -59,6 +60,7 @@ OrderRequest request_of(const OrderOptions& asked) {
     request.send.emplace();
     for (const std::string& name : asked.send) request.send->push_back({.pacs = name});
   }
+  if (!asked.label_volume.empty()) request.label_volume = asked.label_volume;
   if (asked.priority) request.priority = asked.priority;
   return request;
 }
@@ -136,6 +138,10 @@ void add_order_options(CLI::App& app, Options& options, OrderOptions& order) {
       ->allow_extra_args(false);
   app.add_flag("--send-nothing", order.sends_nothing, "Make the mesh, but send it nowhere")
       ->excludes("--send");
+  app.add_option("--label-volume", order.label_volume,
+                 "Id of an uploaded volume of labels on the grid of the series, such as the result "
+                 "of an AI. It is meshed in place of the series")
+      ->type_name("ID");
   add_name<Priority>(app, "--priority", "Priority of the order",
                      [&order](Priority priority) { order.priority = priority; });
   app.add_option("--key", options.key,

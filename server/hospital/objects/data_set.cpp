@@ -61,15 +61,17 @@ void DataSet::set_bytes(Tag tag, std::string_view vr, std::string_view bytes) {
   elements_[tag] = {std::string(vr), std::string(bytes)};
 }
 
-void DataSet::set_sequence(Tag tag, const std::vector<DataSet>& items) {
+void DataSet::append_item(const DataSet& item, std::string& bytes) {
   constexpr Tag kItem = 0xFFFEE000;
+  const std::string content = item.bytes();
+  append_tag(kItem, bytes);
+  append_number(static_cast<std::uint32_t>(content.size()), 4, bytes);
+  bytes += content;
+}
+
+void DataSet::set_sequence(Tag tag, const std::vector<DataSet>& items) {
   std::string value;
-  for (const DataSet& item : items) {
-    const std::string bytes = item.bytes();
-    append_tag(kItem, value);
-    append_number(static_cast<std::uint32_t>(bytes.size()), 4, value);
-    value += bytes;
-  }
+  for (const DataSet& item : items) append_item(item, value);
   elements_[tag] = {"SQ", value};
 }
 

@@ -24,6 +24,8 @@ class DataSet {
   void set_long(Tag tag, std::uint32_t number);                          // UL
   void set_bytes(Tag tag, std::string_view vr, std::string_view bytes);  // an even number of bytes
   void set_sequence(Tag tag, const std::vector<DataSet>& items);
+  // Appends an item of a sequence to its bytes, for sequences that are too long for a vector.
+  static void append_item(const DataSet& item, std::string& bytes);
 
   // All elements; or those before `tag`, or those after it.
   std::string bytes() const;

@@ -1,6 +1,7 @@
 #include "server/hospital/objects/derived_object.h"
 
 #include "base/clock.h"
+#include "server/hospital/objects/uid.h"
 
 namespace isomesh::dicom {
 namespace {
@@ -46,6 +47,15 @@ void add_scanner(const DicomEquipment& equipment, DataSet& data) {
 }
 
 }  // namespace
+
+void add_frame_of_reference(const DicomIdentity& identity, DataSet& data) {
+  const std::string frame =
+      identity.frame_of_reference_uid.empty()
+          ? name_based_uid("frame of reference\n" + identity.study_uid + '\n' + identity.series_uid)
+          : identity.frame_of_reference_uid;
+  data.set(0x00200052, "UI", frame);
+  data.set(0x00201040, "LO", identity.position_reference_indicator);
+}
 
 DataSet code_item(const DicomCode& code) {
   DataSet item;

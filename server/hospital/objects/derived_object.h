@@ -11,6 +11,7 @@
 
 namespace isomesh::dicom {
 
+inline constexpr std::string_view kSegmentationStorage = "1.2.840.10008.5.1.4.1.1.66.4";
 inline constexpr std::string_view kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 
 struct DerivedObject {
@@ -29,6 +30,10 @@ struct DerivedObject {
 // The modules of patient, study, series, equipment and SOP (PS3.3, C.7 and C.12), and the scanner
 // as a contributor. Times are in UTC.
 DataSet derived_object(const DerivedObject& object);
+
+// The frame of reference of the images. Objects of one series share one, even if the images have
+// none.
+void add_frame_of_reference(const DicomIdentity& identity, DataSet& data);
 
 // An item of a sequence of codes.
 DataSet code_item(const DicomCode& code);

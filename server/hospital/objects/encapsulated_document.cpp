@@ -10,7 +10,6 @@
 #include "server/hospital/objects/data_set.h"
 #include "server/hospital/objects/derived_object.h"
 #include "server/hospital/objects/measurement_report.h"
-#include "server/hospital/objects/uid.h"
 #include "server/hospital/protocol/orders.h"
 
 namespace isomesh::dicom {
@@ -43,17 +42,6 @@ std::optional<DicomCode> concept_of(const DocumentObject& object) {
   if (modality == "MR") return DicomCode{"85041-2", "LN", "MR 3D CAM model"};
   if (modality == "US") return DicomCode{"129018", "DCM", "Ultrasound 3D CAM model"};
   return std::nullopt;
-}
-
-void add_frame(const DocumentObject& object, DataSet& data) {
-  const DicomIdentity& identity = object.identity;
-  // Meshes of one series share a frame of reference, even if the images have none.
-  const std::string frame =
-      identity.frame_of_reference_uid.empty()
-          ? name_based_uid("frame of reference\n" + identity.study_uid + '\n' + identity.series_uid)
-          : identity.frame_of_reference_uid;
-  data.set(0x00200052, "UI", frame);
-  data.set(0x00201040, "LO", identity.position_reference_indicator);
 }
 
 // An item of ReferencedSeriesSequence.
@@ -122,6 +110,7 @@ std::string_view name_of_class(std::string_view sop_class) {
   const auto* row = std::ranges::find(kKinds, sop_class, &KindRow::sop_class);
   if (row != kKinds.end()) return row->name;
   if (sop_class == kEnhancedSrStorage) return "Enhanced SR";
+  if (sop_class == kSegmentationStorage) return "Segmentation";
   throw Error(ErrorCode::kInternal, "an object of an unknown class");
 }
 
@@ -143,7 +132,7 @@ Envelope make_envelope(const DocumentObject& object, std::uint64_t document_byte
                                  .title = object.title,
                                  .made = object.made,
                                  .station_name = object.station_name});
-  add_frame(object, data);
+  add_frame_of_reference(object.identity, data);
   add_references(object, data);
   add_document(object, document_bytes, data);
   add_model(object, data);

@@ -12,7 +12,6 @@
 namespace isomesh::dicom {
 namespace {
 
-constexpr std::string_view kSegmentationStorage = "1.2.840.10008.5.1.4.1.1.66.4";
 constexpr const char* kContains = "CONTAINS";
 constexpr const char* kHasContext = "HAS OBS CONTEXT";
 constexpr const char* kHasModifier = "HAS CONCEPT MOD";

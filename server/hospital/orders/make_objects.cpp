@@ -10,8 +10,10 @@
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
+#include "server/hospital/objects/derived_object.h"
 #include "server/hospital/objects/encapsulated_document.h"
 #include "server/hospital/objects/measurement_report.h"
+#include "server/hospital/objects/segmentation.h"
 #include "server/hospital/objects/uid.h"
 #include "server/hospital/orders/measure_surfaces.h"
 #include "server/jobs/library/label_pages.h"
@@ -94,8 +96,12 @@ std::string canonical_parameters(MeshParameters parameters, SendFormat format) {
   return to_json(parameters);
 }
 
-std::string series_uid_of(const DicomIdentity& identity, const Job& job, SendFormat format) {
-  const std::string kind = format == SendFormat::kSr ? "series of reports\n" : "series\n";
+std::string series_uid_of(const DicomIdentity& identity, const Job& job, const Making& making,
+                          SendFormat format) {
+  std::string kind = format == SendFormat::kSr    ? "series of reports\n"
+                     : format == SendFormat::kSeg ? "series of segmentations\n"
+                                                  : "series\n";
+  if (making.labels) kind += "labels " + making.labels->samples + '\n';
   return dicom::name_based_uid(kind + identity.study_uid + '\n' + identity.series_uid + '\n' +
                                canonical_parameters(job.parameters, format) + '\n' +
                                ISOMESH_VERSION);
@@ -184,7 +190,9 @@ std::vector<Document> documents_of(const store::OrderRecord& record, const Job& 
     if (is_sent_as(record, SendFormat::kObj)) {
       std::ranges::move(obj_documents(job, blobs), std::back_inserter(documents));
     }
-    if (!documents.empty() || is_sent_as(record, SendFormat::kSr)) return documents;
+    const bool has_others =
+        is_sent_as(record, SendFormat::kSr) || is_sent_as(record, SendFormat::kSeg);
+    if (!documents.empty() || has_others) return documents;
   }
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
@@ -196,7 +204,7 @@ dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
   object.format = document.format;
   object.label = document.label;
   object.sop_class_uid = dicom::sop_class_of(document.kind);
-  object.series_uid = series_uid_of(identity, job, document.format);
+  object.series_uid = series_uid_of(identity, job, making, document.format);
   object.sop_instance_uid = instance_uid_of(object, identity, document.sha256);
   const std::string title =
       document.label ? record.work.label + ' ' + document.name : record.work.label;
@@ -230,7 +238,7 @@ std::string report_of(const store::OrderRecord& record, const Job& job, const Ma
   const DicomIdentity& identity = record.work.identity.value();
   object.format = SendFormat::kSr;
   object.sop_class_uid = dicom::kEnhancedSrStorage;
-  object.series_uid = series_uid_of(identity, job, object.format);
+  object.series_uid = series_uid_of(identity, job, making, object.format);
   dicom::MeasurementReport report = {
       .identity = identity,
       .segmented_series_uid = record.work.segmented_series,
@@ -248,13 +256,6 @@ std::string report_of(const store::OrderRecord& record, const Job& job, const Ma
   return dicom::make_report(report);
 }
 
-std::uint64_t bytes_of(const dicom::Envelope& envelope, const Document& document) {
-  return envelope.before.size() + document.size() + envelope.after.size();
-}
-
-// Additional text in the object of a simplified mesh.
-constexpr std::uint64_t kGrowthOfText = 400;
-
 [[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
                                   const OrderWork& work) {
   std::string text = "the object has " + std::to_string(bytes) +
@@ -266,6 +267,63 @@ constexpr std::uint64_t kGrowthOfText = 400;
   }
   throw Error(ErrorCode::kTooLarge, text);
 }
+
+dicom::SegmentationObject segmentation_of(const store::OrderRecord& record, const Job& job,
+                                          const Making& making, const store::BlobStore& blobs,
+                                          MadeObject& object) {
+  const LabelGrid& grid = making.labels.value();
+  const DicomIdentity& identity = record.work.identity.value();
+  std::vector<dicom::SegmentationSegment> segments;
+  std::string content = "labels " + grid.samples + '\n';
+  jobs::JobLabels(job, blobs).for_each([&](const LabelSummary& label) {
+    if (label.voxels == 0) return;
+    const std::string name = label.name.value_or("Label " + std::to_string(label.label));
+    segments.push_back(
+        {.label = label.label, .name = in_short(without_backslashes(name)), .color = label.color});
+    content += std::to_string(label.label) + ' ' + name + ' ' + label.color.value_or("") + '\n';
+  });
+  object.format = SendFormat::kSeg;
+  object.sop_class_uid = dicom::kSegmentationStorage;
+  object.series_uid = series_uid_of(identity, job, making, object.format);
+  object.sop_instance_uid = instance_uid_of(object, identity, content);
+  return {.identity = identity,
+          .series_uid = object.series_uid,
+          .sop_instance_uid = object.sop_instance_uid,
+          .series_number = record.work.series_number.value_or(0),
+          .title = in_short(without_backslashes(record.work.label)),
+          .made = making.made,
+          .station_name = making.station_name,
+          .dims = grid.dims,
+          .origin = grid.origin,
+          .steps = grid.steps,
+          .segments = std::move(segments),
+          .frames = {}};
+}
+
+// Writes the segmentation piece by piece.
+MadeObject make_segmentation(const store::OrderRecord& record, const Job& job, const Making& making,
+                             store::BlobWriter& writer, const store::BlobStore& blobs) {
+  MadeObject object;
+  dicom::SegmentationObject segmentation = segmentation_of(record, job, making, blobs, object);
+  std::vector<std::int64_t> labels;
+  for (const auto& segment : segmentation.segments) labels.push_back(segment.label);
+  const LabelGrid& grid = *making.labels;
+  segmentation.frames = frames_of(grid, labels, blobs, making.stop);
+  const std::string head = dicom::segmentation_head(segmentation);
+  const std::uint64_t bytes = head.size() + dicom::segmentation_pixel_bytes(segmentation);
+  if (bytes > making.most_bytes) throw_too_large(bytes, making.most_bytes, record.work);
+  write(head, writer);
+  write_frames(grid, labels, segmentation.frames, blobs, making.stop,
+               [&](std::span<const std::byte> piece) { writer.write(piece); });
+  return object;
+}
+
+std::uint64_t bytes_of(const dicom::Envelope& envelope, const Document& document) {
+  return envelope.before.size() + document.size() + envelope.after.size();
+}
+
+// Additional text in the object of a simplified mesh.
+constexpr std::uint64_t kGrowthOfText = 400;
 
 }  // namespace
 
@@ -316,6 +374,10 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
     const auto writer = blobs.begin(record.owner);
     write(report, *writer);
     commit(*writer, std::move(object));
+  }
+  if (is_sent_as(record, SendFormat::kSeg)) {
+    const auto writer = blobs.begin(record.owner);
+    commit(*writer, make_segmentation(record, job, making, *writer, blobs));
   }
   return objects;
 }

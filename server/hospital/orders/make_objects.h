@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "proto/types.h"
+#include "server/hospital/orders/label_grid.h"
 #include "server/hospital/protocol/orders.h"
 #include "server/hospital/records/order_store.h"
 #include "server/store/blob_store.h"
@@ -33,10 +34,12 @@ struct Making {
   std::uint64_t most_bytes = 0;  // of an object
   std::chrono::system_clock::time_point made;
   std::stop_token stop;
+  std::optional<LabelGrid> labels = {};  // of an order with a label volume
 };
 
 // Makes the objects of all formats that the order sends. STL: one, or one for each label. OBJ: one
-// of all labels, after the object of their materials. SR: one report on all surfaces. UIDs are
+// of all labels, after the object of their materials. SR: one report on all surfaces. SEG: one
+// segmentation with the samples of all labels that have a surface. UIDs are
 // derived from the content, so the same images with the same mesh always have the same UIDs.
 // `stored` gets the keys of the blobs, which no record names yet, also if it throws. Throws Error
 // kUnusableVolume for an empty surface, kTooLarge if an object exceeds `most_bytes`, kCancelled,

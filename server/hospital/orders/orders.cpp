@@ -147,11 +147,14 @@ std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest
                                       const std::string& idempotency_key,
                                       const std::string& request_digest) {
   using Kind = store::OrderSubmission::Kind;
-  const store::OrderSubmission submission =
-      services_.orders.submit({.record = make_order(settings_, orderer, request),
-                               .idempotency_key = idempotency_key,
-                               .request_digest = request_digest},
-                              settings_.most_open);
+  const store::OrderRecord record = make_order(settings_, orderer, request);
+  if (const auto& labels = record.order.label_volume;
+      labels && !services_.volumes.contains(record.owner, *labels)) {
+    throw invalid_parameter("label_volume", "is not the id of a volume of the order's owner");
+  }
+  const store::OrderSubmission submission = services_.orders.submit(
+      {.record = record, .idempotency_key = idempotency_key, .request_digest = request_digest},
+      settings_.most_open);
   if (submission.kind == Kind::kConflict) {
     throw Error(ErrorCode::kKeyReused, "the idempotency key was used for another request");
   }

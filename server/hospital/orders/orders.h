@@ -33,6 +33,8 @@ struct OrderOptions {
   std::function<std::string()> keep_orders = {};
   // Called on stop; aborts long operations of steps, such as imports.
   std::function<void()> cut_off = {};
+  // Removes what else is not kept since that time, and returns its number.
+  std::function<std::size_t(store::Time before)> forget_also = {};
   std::size_t threads = 6;
   // Simultaneous steps per PACS, so that one that hangs does not block the others.
   std::size_t per_pacs = 2;

@@ -47,6 +47,17 @@ void add_sent_files(Order& order) {
   }
 }
 
+void check_labels(const Order& order) {
+  if (order.label_volume && !order.parameters.labels) {
+    throw invalid_parameter("parameters.labels", "is required with label_volume");
+  }
+  const bool is_segmented =
+      std::ranges::find(order.send, SendFormat::kSeg, &SendTarget::format) != order.send.end();
+  if (is_segmented && !order.label_volume) {
+    throw invalid_parameter("label_volume", "is required to send the format \"seg\"");
+  }
+}
+
 store::OrderRecord new_record() {
   store::OrderRecord record;
   record.order.id = time_ordered_id();
@@ -81,6 +92,8 @@ store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& o
     const PacsSettings& pacs = pacs_of(settings, target.pacs, "send.pacs");
     if (rule == nullptr || request.send) check_owner(pacs, orderer);
   }
+  order.label_volume = request.label_volume;
+  check_labels(order);
   add_sent_files(order);
   record.owner = rule != nullptr && orderer.is_administrator && !rule->owner.empty() ? rule->owner
                                                                                      : orderer.name;

@@ -288,6 +288,21 @@ std::optional<SyslogSettings> read_audit(Section section) {
   return syslog;
 }
 
+WorklistSettings read_own_worklist(Section section) {
+  WorklistSettings worklist;
+  section.read("requesters", worklist.requesters);
+  section.read("performers", worklist.performers);
+  section.read("max-workitems", worklist.most, 1, 100'000);
+  section.finish();
+  return worklist;
+}
+
+bool is_route(const HospitalSettings& settings, const std::string& rule) {
+  return settings.dimse && std::ranges::any_of(settings.dimse->routes, [&](const auto& route) {
+           return route.second == rule;
+         });
+}
+
 // Checks that names are unique and that all references exist.
 void check_names(const HospitalSettings& settings) {
   std::set<std::string> names;
@@ -299,6 +314,13 @@ void check_names(const HospitalSettings& settings) {
   for (const Rule& rule : settings.rules) {
     if (!rules.insert(rule.name).second) {
       refuse("rules.name", "\"" + rule.name + "\" is given twice");
+    }
+    const bool is_segmented =
+        std::ranges::find(rule.send, SendFormat::kSeg, &SendTarget::format) != rule.send.end();
+    const bool is_automatic = rule.watch || rule.worklist || is_route(settings, rule.name);
+    if (is_segmented && is_automatic) {
+      refuse("rules." + rule.name + ".send",
+             "cannot have the format \"seg\": only a request can name a label volume");
     }
     std::vector<std::string> used;
     if (rule.watch) used.push_back(*rule.watch);
@@ -335,13 +357,14 @@ HospitalSettings settings_of(const toml::table& table) {
   for (Section& section : all.sections("rules")) settings.rules.push_back(read_rule(section));
   if (auto dimse = all.section("dimse")) settings.dimse = read_dimse(std::move(*dimse));
   if (auto audit = all.section("audit")) settings.syslog = read_audit(std::move(*audit));
+  if (auto own = all.section("worklist")) settings.worklist = read_own_worklist(std::move(*own));
   all.finish();
-  if (settings.pacs.empty()) refuse("pacs", "is required: orders need a PACS");
+  if (settings.pacs.empty() && !settings.worklist) {
+    refuse("pacs", "is required: orders need a PACS");
+  }
   check_names(settings);
   return settings;
 }
-
-char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 }  // namespace
 
@@ -370,31 +393,6 @@ HospitalSettings parse_settings(std::string_view toml) {
 HospitalSettings read_settings(const std::filesystem::path& file) {
   const InputFile input = InputFile::chosen(file);
   return parse_settings(input.text(0, static_cast<std::size_t>(input.size())));
-}
-
-bool matches(std::string_view pattern, std::string_view text) {
-  // The last * seen, and the end of the text it matches so far: backtracking only ever extends that
-  // match.
-  std::size_t star = std::string_view::npos;
-  std::size_t star_text = 0;
-  std::size_t p = 0;
-  std::size_t t = 0;
-  while (t < text.size()) {
-    if (p < pattern.size() && pattern[p] == '*') {
-      star = p++;
-      star_text = t;
-    } else if (p < pattern.size() &&
-               (pattern[p] == '?' || lower_of(pattern[p]) == lower_of(text[t]))) {
-      ++p;
-      ++t;
-    } else if (star != std::string_view::npos) {
-      p = star + 1;
-      t = ++star_text;
-    } else {
-      return false;
-    }
-  }
-  return pattern.substr(p).find_first_not_of('*') == std::string_view::npos;
 }
 
 }  // namespace isomesh::orders

@@ -88,6 +88,13 @@ struct SyslogSettings {
   std::filesystem::path key_file;
 };
 
+// The own worklist, for workitems that others perform, or this daemon.
+struct WorklistSettings {
+  std::vector<std::string> requesters;  // may create and cancel workitems; empty: everybody
+  std::vector<std::string> performers;  // may claim and perform them; empty: everybody
+  std::size_t most = 10'000;            // workitems
+};
+
 struct HospitalSettings {
   std::chrono::seconds settle{60};  // a series' list of instances must be unchanged for this long
   std::chrono::seconds poll{30};
@@ -100,6 +107,7 @@ struct HospitalSettings {
   std::vector<Rule> rules;
   std::optional<DimseSettings> dimse;
   std::optional<SyslogSettings> syslog;
+  std::optional<WorklistSettings> worklist;
 
   // Null if there is no PACS with that name.
   const PacsSettings* find_pacs(std::string_view name) const;
@@ -110,8 +118,5 @@ struct HospitalSettings {
 // wrong type or out of range (without its value), or the line with a syntax error.
 HospitalSettings read_settings(const std::filesystem::path& file);
 HospitalSettings parse_settings(std::string_view toml);
-
-// True if the text matches the pattern: see SeriesMatch.
-bool matches(std::string_view pattern, std::string_view text);
 
 }  // namespace isomesh::orders

@@ -232,6 +232,10 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
     if (!record.order.send.empty()) check_identity(*volume.dicom);
     record.order.volume = volume.id;
     record.work.identity = volume.dicom;
+    if (record.order.label_volume) {
+      record.work.image_geometry = volume.geometry;
+      label_grid_of(record, volume.dims);  // fails at once if they do not fit
+    }
     record.work.segmented_series = segmented_series_of(record, stop);
   } catch (const Error& error) {
     // Images that make no volume have crossed the network, too.
@@ -243,6 +247,25 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   }
   record.order.state = OrderState::kMeshing;
   return save_after(OrderState::kFetching, record, now_());
+}
+
+LabelGrid OrderSteps::label_grid_of(
+    const store::OrderRecord& record,
+    const std::optional<std::array<std::uint32_t, 3>>& image_dims) const {
+  try {
+    const Volume labels = services_.volumes.get(record.owner, *record.order.label_volume);
+    const std::size_t images = record.work.identity->instances.size();
+    if (images != labels.dims[2]) {
+      throw Error(ErrorCode::kUnusableVolume, "the series has " + std::to_string(images) +
+                                                  " images, but the label volume has " +
+                                                  std::to_string(labels.dims[2]) + " slices");
+    }
+    return label_grid(*record.work.image_geometry, image_dims.value_or(labels.dims), labels);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+    throw Error(ErrorCode::kUnusableVolume,
+                "the label volume is gone: upload it again, and submit a new order");
+  }
 }
 
 // Only a report on labels needs it.
@@ -263,7 +286,7 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   if (record.work.triangles) simplify(record.work, parameters);
   // A report tells how far the mesh may be from the surface.
   if (is_reported(record.order)) parameters.certify = true;
-  parameters.volume = *record.order.volume;
+  parameters.volume = record.order.label_volume.value_or(*record.order.volume);
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;
   if (!parameters.preset.empty()) {
@@ -335,6 +358,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::sto
                      .most_bytes = std::numeric_limits<std::uint64_t>::max(),
                      .made = job.finished ? time_of(*job.finished) : now_(),
                      .stop = stop};
+    if (record.order.label_volume) making.labels = label_grid_of(record);
     for (const SendTarget& target : record.order.send) {
       const PacsSettings* pacs = settings_.find_pacs(target.pacs);
       if (pacs != nullptr) making.most_bytes = std::min(making.most_bytes, pacs->max_send_bytes);

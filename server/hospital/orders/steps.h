@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "server/hospital/orders/label_grid.h"
 #include "server/hospital/orders/pacs.h"
 #include "server/hospital/orders/settings.h"
 #include "server/hospital/records/order_store.h"
@@ -107,6 +108,11 @@ class OrderSteps {
   // As above, without resetting failures.
   store::Time save(store::OrderRecord& record, store::Time next) const;
   // Throw PacsFailure if there is no such peer, or it cannot do that.
+  // Throws Error kUnusableVolume if the label volume does not fit the images, or is gone. Without
+  // the sizes of the images, they were checked before.
+  LabelGrid label_grid_of(
+      const store::OrderRecord& record,
+      const std::optional<std::array<std::uint32_t, 3>>& image_dims = std::nullopt) const;
   const Peer& peer(const std::string& name) const;
   SeriesSource& source(const std::string& name) const;
   // Empty if the PACS cannot be queried; its response to storing is then the only evidence.

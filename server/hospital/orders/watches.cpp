@@ -8,6 +8,7 @@
 #include "base/log.h"
 #include "server/hospital/objects/uid.h"
 #include "server/hospital/orders/orders.h"
+#include "server/hospital/orders/pattern.h"
 
 namespace isomesh::orders {
 namespace {
@@ -153,9 +154,12 @@ void Orders::forget() {
       (options_.believed_now ? options_.believed_now() : options_.now()) - options_.keep;
   const std::size_t orders = services_.orders.forget(before);
   const std::size_t instances = services_.received.forget(before);
-  if (orders + instances == 0) return;
-  log_info("removed {} orders that ended before {} (--keep-days) and the notes of {} instances",
-           orders, timestamp_of(before), instances);
+  const std::size_t workitems = options_.forget_also ? options_.forget_also(before) : 0;
+  if (orders + instances + workitems == 0) return;
+  log_info(
+      "removed {} orders that ended before {} (--keep-days), the notes of {} instances, and {} "
+      "workitems",
+      orders, timestamp_of(before), instances, workitems);
 }
 
 }  // namespace isomesh::orders

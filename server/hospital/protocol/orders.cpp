@@ -17,6 +17,12 @@ namespace isomesh {
 
 // Fields as in proto/fields.h. Requests have rows, for request_reader.h.
 
+void visit(Is<Geometry> auto& self, auto&& field) {
+  field("origin", self.origin);
+  field("spacing", self.spacing);
+  field("direction", self.direction);
+}
+
 void visit(Is<OrderSource> auto& self, auto&& field) {
   field(Parameter{.name = "pacs", .is_required = true}, self.pacs);
   field(Parameter{.name = "study", .is_required = true}, self.study);
@@ -48,6 +54,7 @@ void visit(Is<Order> auto& self, auto&& field) {
   field("parameters", self.parameters);
   field("priority", self.priority);
   field("send", self.send);
+  field("label_volume", self.label_volume);
   field("volume", self.volume);
   field("job", self.job);
   field("results", self.results);
@@ -63,6 +70,7 @@ void visit(Is<OrderRequest> auto& self, auto&& field) {
   field(Parameter{.name = "source", .is_required = true}, self.source);
   field(Parameter{.name = "rule"}, self.rule);
   field(Parameter{.name = "send"}, self.send);
+  field(Parameter{.name = "label_volume"}, self.label_volume);
   field(Parameter{.name = "priority"}, self.priority);
   field(Parameter{.name = "callback"}, self.callback);
 }
@@ -97,6 +105,7 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("contents", self.contents);
   field("workitem", self.workitem);
   field("segmented_series", self.segmented_series);
+  field("image_geometry", self.image_geometry);
 }
 
 void visit(Is<PacsStatus> auto& self, auto&& field) {
@@ -119,9 +128,9 @@ constexpr std::array kStates = {
     std::pair{OrderState::kSucceeded, "succeeded"}, std::pair{OrderState::kFailed, "failed"},
     std::pair{OrderState::kCancelled, "cancelled"}};
 
-constexpr std::array kSendFormats = {std::pair{SendFormat::kStl, "stl"},
-                                     std::pair{SendFormat::kObj, "obj"},
-                                     std::pair{SendFormat::kSr, "sr"}};
+constexpr std::array kSendFormats = {
+    std::pair{SendFormat::kStl, "stl"}, std::pair{SendFormat::kObj, "obj"},
+    std::pair{SendFormat::kSr, "sr"}, std::pair{SendFormat::kSeg, "seg"}};
 
 constexpr std::string_view kFormats = "formats";
 
@@ -184,7 +193,7 @@ std::optional<SendFormat> from_string(std::string_view name) {
 
 template <>
 std::string names_of<SendFormat>() {
-  return R"("stl", "obj" or "sr")";
+  return R"("stl", "obj", "sr" or "seg")";
 }
 
 MeshFormat file_for(SendFormat format) {
@@ -225,6 +234,7 @@ std::string to_json(const OrderRequest& request) {
   if (request.rule) json["rule"] = *request.rule;
   if (request.parameters) json["parameters"] = object_of(*request.parameters, "parameters");
   if (request.send) json_values::write_field(json, "send", *request.send);
+  if (request.label_volume) json["label_volume"] = *request.label_volume;
   if (request.priority) json_values::write_field(json, "priority", *request.priority);
   if (request.callback) json["callback"] = {{"url", request.callback->url}};
   return dump(json);

@@ -46,6 +46,7 @@ enum class SendFormat {
   kStl,  // Encapsulated STL: one, or one for each label
   kObj,  // Encapsulated OBJ of all labels, and their materials
   kSr,   // a structured report of measurements on the meshes
+  kSeg,  // a segmentation with the labels of the order's label volume
 };
 
 std::string_view to_string(SendFormat value);
@@ -87,6 +88,8 @@ struct Order {
   MeshParameters parameters;
   Priority priority = Priority::kRoutine;
   std::vector<SendTarget> send;
+  // An uploaded volume of labels on the grid of the series, which is meshed in its place.
+  std::optional<std::string> label_volume = {};
   std::optional<std::string> volume = {};  // once fetched
   std::optional<std::string> job = {};
   std::vector<OrderResult> results;
@@ -140,6 +143,8 @@ struct OrderWork {
   std::optional<OrderState> failed_in = {};
   std::optional<Workitem> workitem = {};
   std::string segmented_series = {};  // of a segmentation: the series of its images, if known
+  // The geometry of the images, if there is a label volume.
+  std::optional<Geometry> image_geometry = {};
 
   bool operator==(const OrderWork&) const = default;
 };
@@ -150,6 +155,7 @@ struct OrderRequest {
   std::optional<std::string> rule;
   std::optional<std::string> parameters;  // as JSON, unchecked: parse_order_parameters reads it
   std::optional<std::vector<SendTarget>> send;
+  std::optional<std::string> label_volume = {};
   std::optional<Priority> priority;
   std::optional<Callback> callback;
 };

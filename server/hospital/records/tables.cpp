@@ -55,17 +55,32 @@ CREATE INDEX received_held ON received(route, study, series, at, bytes) WHERE bl
 CREATE INDEX received_by_blob ON received(blob) WHERE blob IS NOT NULL;
 )sql";
 
+constexpr const char* kWorkitems = R"sql(
+CREATE TABLE workitems(         -- of the own worklist; states are the values of WorkitemState
+  uid {key} NOT NULL PRIMARY KEY,
+  state INTEGER NOT NULL,
+  created BIGINT NOT NULL,
+  changed BIGINT NOT NULL,
+  "transaction" {key},          -- secret of the performer, once it is claimed
+  bytes BIGINT NOT NULL,        -- of the record
+  record TEXT NOT NULL          -- its attributes in the DICOM JSON Model
+){by_key};
+CREATE INDEX workitems_by_state ON workitems(state, created, uid);
+CREATE INDEX workitems_by_time ON workitems(created, uid);
+CREATE INDEX workitems_by_change ON workitems(changed);
+)sql";
+
 }  // namespace
 
 Schema order_tables() {
   return {.component = "hospital",
-          .steps = {kTables},
-          .tables = {"orders", "order_blobs", "watched", "received"},
+          .steps = {kTables, kWorkitems},
+          .tables = {"orders", "order_blobs", "watched", "received", "workitems"},
           .named_blobs =
               "SELECT blob, 'an object of the order ' AS what, \"order\" AS name FROM "
               "order_blobs UNION ALL SELECT blob, 'the received image ', instance FROM "
               "received",
-          .kept_from = {{"orders", "finished"}}};
+          .kept_from = {{"orders", "finished"}, {"workitems", "changed"}}};
 }
 
 }  // namespace isomesh::store

@@ -4,7 +4,7 @@
 
 namespace isomesh::store {
 
-// The tables of orders, watches and received series.
+// The tables of orders, watches, received series and the own worklist.
 Schema order_tables();
 
 }  // namespace isomesh::store

@@ -158,6 +158,7 @@ class HttplibServer : public httplib::Server {
       };
       Post("/", read);
       Patch("/", read);
+      Put("/", read);
     }
     set_error_handler([this](const httplib::Request& /*in*/, httplib::Response& out) {
       if (is_answered_) return;
@@ -185,7 +186,9 @@ class HttplibServer : public httplib::Server {
     }
   }
 
-  bool takes_body() const { return request_.method == "POST" || request_.method == "PATCH"; }
+  bool takes_body() const {
+    return request_.method == "POST" || request_.method == "PATCH" || request_.method == "PUT";
+  }
 
   // Takes the decoded path and query from the library, and gives it the headers it needs: it would
   // answer Expect before the handler knows whether it wants the body, and it inflates bodies, reads

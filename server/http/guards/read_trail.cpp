@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kMostWindows = 10'000;
 
 constexpr int kUnauthorized = 401;
+constexpr int kNotAllowed = 403;
 
 bool is_read(int status) {
   return (status >= 200 && status < 300) || status == 304 || status == 307;
@@ -60,10 +61,18 @@ std::optional<ReadTrail::Reading> ReadTrail::reading_of(const Request& request,
   constexpr std::string_view kVolume = "/v1/volumes/{id}";
   constexpr std::string_view kJob = "/v1/jobs/{id}";
   if (request.method != "GET" && request.method != "HEAD") return std::nullopt;
+  if (!is_read(response.status) && !is_refused(response.status)) return std::nullopt;
+  if (response.told) {
+    return Reading{.caller = request.context.caller.name,
+                   .address = request.remote_address,
+                   .id = {},
+                   .what = response.told->what,
+                   .success = is_read(response.status),
+                   .told = response.told};
+  }
   const std::string_view route = request.context.route;
   const bool is_of_job = route.starts_with(kJob);
   if (!is_of_job && !route.starts_with(kVolume)) return std::nullopt;
-  if (!is_read(response.status) && !is_refused(response.status)) return std::nullopt;
   std::string_view what = route.substr((is_of_job ? kJob : kVolume).size());
   if (is_of_job && (what.empty() || what == "/events")) return std::nullopt;
   what = what.empty() ? "volume" : what.substr(1);
@@ -85,6 +94,11 @@ std::optional<store::AuditEntry> ReadTrail::entry_of(const Reading& reading) con
                              .volume = reading.id,
                              .requests = 1};
   if (is_transfer(reading.what)) entry.direction = "out";
+  if (reading.told) {
+    entry.study = reading.told->study;
+    entry.patient_id = reading.told->patient_id;
+    return entry;
+  }
   if (reading.is_of_job) {
     const auto job = record_of([&] { return stores_.jobs.get(store::Viewer(), reading.id); });
     if (!job) return std::nullopt;
@@ -121,19 +135,28 @@ void ReadTrail::close_windows(Clock::time_point until) {
   });
 }
 
-void ReadTrail::note_refusal(const Request& request) {
-  const auto unlisted = refusals_.permit();
+void ReadTrail::note_refusal(const Request& request, store::AuditEvent event, const char* what,
+                             Throttle& throttle) {
+  const auto unlisted = throttle.permit();
   if (!unlisted) return;
-  add({.event = store::AuditEvent::kAuthenticationFailure,
+  add({.event = event,
        .success = false,
        .peer = request.remote_address,
        .unlisted = *unlisted,
-       .what = "login"});
+       .caller = request.context.caller.name,
+       .what = what});
 }
 
 void ReadTrail::note(const Request& request, const Response& response) {
-  if (response.status == kUnauthorized) return note_refusal(request);
+  using store::AuditEvent;
+  if (response.status == kUnauthorized) {
+    return note_refusal(request, AuditEvent::kAuthenticationFailure, "login", refusals_);
+  }
   const auto reading = reading_of(request, response);
+  // Only a login has a name: pages of other origins are rejected before they log in.
+  if (!reading && response.status == kNotAllowed && !request.context.caller.name.empty()) {
+    return note_refusal(request, AuditEvent::kRestricted, "permission", restrictions_);
+  }
   if (!reading) return;
   // Held while the entry is written, so that no response to the same reading is sent before.
   const Lock lock(mutex_);

@@ -1,4 +1,5 @@
-// Enters into the audit trail who reads the data of patients, and whose token was refused.
+// Enters into the audit trail who reads the data of patients, whose token was refused, and who
+// tried what the token does not allow.
 #pragma once
 
 #include <chrono>
@@ -54,6 +55,7 @@ class ReadTrail {
     std::string id;    // of the volume or the job
     std::string what;  // "volume", "slice", "mesh", ...
     bool success = true;
+    std::optional<ToldPatient> told = {};
 
     auto operator<=>(const Reading&) const = default;
   };
@@ -67,7 +69,9 @@ class ReadTrail {
   static std::optional<Reading> reading_of(const Request& request, const Response& response);
   // Empty if there is no patient.
   std::optional<store::AuditEntry> entry_of(const Reading& reading) const;
-  void note_refusal(const Request& request);
+  // One in a while: otherwise strangers could fill the trail.
+  void note_refusal(const Request& request, store::AuditEvent event, const char* what,
+                    Throttle& throttle);
   // Returns false if the trail cannot be written to.
   bool add(const store::AuditEntry& entry) const;
   // Enters the counts of the windows that have ended by then, and closes those.
@@ -75,7 +79,8 @@ class ReadTrail {
 
   const Stores stores_;
   const std::chrono::milliseconds window_;
-  Throttle refusals_{std::chrono::seconds(1)};  // otherwise strangers could fill the trail
+  Throttle refusals_{std::chrono::seconds(1)};
+  Throttle restrictions_{std::chrono::seconds(1)};
   Mutex mutex_;
   std::map<Reading, Window> windows_ ISOMESH_GUARDED_BY(mutex_);
   std::jthread closing_;  // last: uses the other members

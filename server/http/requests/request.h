@@ -91,7 +91,7 @@ struct Request {
   net::Headers headers;
   std::optional<std::uint64_t> content_length;
   std::string remote_address;  // empty for a Unix socket
-  BodyReader* body = nullptr;  // only for POST and PATCH
+  BodyReader* body = nullptr;  // only for POST, PATCH and PUT
   RequestContext context;
 
   bool has_header(std::string_view name) const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <compare>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -28,12 +29,23 @@ struct StreamedBody {
   std::uint64_t length = 0;  // with kLength: the source's bytes, not 0
 };
 
+// What a response tells about a patient, for the audit trail, if it belongs to no volume and no
+// job.
+struct ToldPatient {
+  std::string what;  // "workitem"
+  std::string study = {};
+  std::string patient_id = {};
+
+  auto operator<=>(const ToldPatient&) const = default;
+};
+
 struct Response {
   int status = 200;
   net::Headers headers;
   std::string media_type;
   std::string body;                    // compressed if the client accepts that
   std::optional<StreamedBody> stream;  // instead of `body`; never compressed
+  std::optional<ToldPatient> told;
 
   bool has_header(std::string_view name) const;
   void set_header(std::string_view name, std::string_view value);

@@ -17,10 +17,11 @@ namespace isomesh::http {
 namespace {
 
 // Browsers let foreign pages send plain text without a preflight, but not JSON.
-void check_is_json(const Request& request) {
+void check_is_json(const Request& request, std::string_view wanted) {
   const std::string_view type = split(request.header("Content-Type"), ';').front();
-  if (type.empty() || lower(type) == "application/json") return;
-  throw Error(ErrorCode::kUnsupportedMedia, "the body's Content-Type must be application/json");
+  if (type.empty() || lower(type) == wanted) return;
+  throw Error(ErrorCode::kUnsupportedMedia,
+              "the body's Content-Type must be " + std::string(wanted));
 }
 
 }  // namespace
@@ -86,10 +87,15 @@ net::FairPlaces::Place place_for_upload(App& app, const Request& request) {
 }
 
 std::string json_body(App& app, const Request& request) {
-  check_is_json(request);
+  return json_body(app, request, "application/json", limits::kMostJsonBytes);
+}
+
+std::string json_body(App& app, const Request& request, std::string_view type,
+                      std::size_t most_bytes) {
+  check_is_json(request, type);
   const auto place =
       request.body->is_whole() ? net::FairPlaces::Place() : app.uploads.take(party_of(request));
-  return read_text(request, limits::kMostJsonBytes);
+  return read_text(request, most_bytes);
 }
 
 JobParameters complete_parameters(const App& app, const Request& request,

@@ -40,6 +40,10 @@ void add_patch(App& app, const std::string& pattern, const Run& run) {
   app.router.add("PATCH", pattern, handler_of(run));
 }
 template <class Run>
+void add_put(App& app, const std::string& pattern, const Run& run) {
+  app.router.add("PUT", pattern, handler_of(run));
+}
+template <class Run>
 void add_delete(App& app, const std::string& pattern, const Run& run) {
   app.router.add("DELETE", pattern, handler_of(run));
 }
@@ -84,6 +88,9 @@ net::FairPlaces::Place place_for_upload(App& app, const Request& request);
 // Reads a small JSON body. A body that has not arrived yet may be slow, so reading it takes one of
 // the places for uploads. Throws as place_for_upload and read_text do.
 std::string json_body(App& app, const Request& request);
+// The same, with this type instead of application/json, and of at most that size.
+std::string json_body(App& app, const Request& request, std::string_view type,
+                      std::size_t most_bytes);
 
 // Completes the parameters from their volume; see jobs::resolve_preset and jobs::complete_labels.
 // Throws as these do, and Error kNotFound without the volume.

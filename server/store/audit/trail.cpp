@@ -28,6 +28,8 @@ Code code_of(AuditEvent event) {
       return {"110104", "DICOM Instances Transferred"};
     case AuditEvent::kAuthenticationFailure:
       return {"110114", "User Authentication"};
+    case AuditEvent::kRestricted:
+      return {"110113", "Security Alert"};
   }
   return {"", ""};
 }

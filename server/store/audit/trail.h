@@ -20,6 +20,7 @@ enum class AuditEvent {
   kQuery,                  // 110112 Query
   kTransferred,            // 110104 DICOM Instances Transferred
   kAuthenticationFailure,  // 110114 User Authentication, failed
+  kRestricted,             // 110113 Security Alert: a login that may not do this tried to
 };
 
 struct AuditEntry {
@@ -39,7 +40,7 @@ struct AuditEntry {
   std::uint64_t unlisted = 0;  // rejected since the entry before, without entries of their own
   // Readings over HTTP, and refused logins there.
   std::string caller = {};  // the name of the token; empty without tokens
-  std::string what = {};    // "volume", "labels", "slice", "mesh", ..., or "login"
+  std::string what = {};    // "volume", "labels", "slice", "mesh", ..., "login" or "permission"
   std::string volume = {};
   std::string job = {};        // of a mesh
   std::uint64_t requests = 0;  // that the entry stands for

@@ -96,10 +96,22 @@ TEST(AuditMessage, OfARefusedLoginNamesTheAddress) {
   EXPECT_THAT(xml, HasSubstr("UserID=\"10.0.0.7\" UserIsRequestor=\"true\""));
 }
 
+TEST(AuditMessage, OfWhatARoleDoesNotAllowNamesTheLogin) {
+  const std::string xml = audit_message(
+      R"({"id":7,"at":"2026-11-20T10:00:00.123Z","event":"110113","outcome":"failure",)"
+      R"("peer":"10.0.0.7","caller":"oidc:248289761001","what":"permission"})",
+      kSource);
+  EXPECT_TRUE(is_xml(xml)) << xml;
+  EXPECT_THAT(xml, HasSubstr("<EventTypeCode csd-code=\"110132\""));
+  EXPECT_THAT(xml, HasSubstr("UserID=\"oidc:248289761001\" UserIsRequestor=\"true\" "
+                             "NetworkAccessPointID=\"10.0.0.7\""));
+}
+
 TEST(AuditMessage, EveryEventHasOne) {
   for (const auto& [code, id, type] :
        {std::tuple{"110120", "110100", "110120"}, std::tuple{"110121", "110100", "110121"},
-        std::tuple{"110112", "110112", ""}, std::tuple{"110114", "110114", "110126"}}) {
+        std::tuple{"110112", "110112", ""}, std::tuple{"110113", "110113", "110132"},
+        std::tuple{"110114", "110114", "110126"}}) {
     const std::string xml =
         audit_message(std::string(R"({"id":1,"at":"2026-11-20T10:00:00.123Z","event":")") + code +
                           R"(","outcome":"failure","pacs":"main"})",

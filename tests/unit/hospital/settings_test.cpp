@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/hospital/orders/pattern.h"
 #include "tests/support/errors.h"
 
 namespace isomesh::orders {

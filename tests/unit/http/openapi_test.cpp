@@ -10,6 +10,7 @@
 #include "tests/unit/http/services.h"
 #ifdef ISOMESH_HOSPITAL
 #include "server/hospital/routes.h"
+#include "server/hospital/worklist_routes.h"
 #endif
 
 namespace isomesh::http {
@@ -29,6 +30,7 @@ class OpenApi : public testing::Test {
     add_service_routes(app_);
 #ifdef ISOMESH_HOSPITAL
     hospital::add_order_routes(app_, nullptr);
+    hospital::add_worklist_routes(app_, nullptr);
 #endif
   }
 
@@ -45,6 +47,7 @@ class OpenApi : public testing::Test {
     if (path_item["post"]) methods.insert("POST");
     if (path_item["delete"]) methods.insert("DELETE");
     if (path_item["patch"]) methods.insert("PATCH");
+    if (path_item["put"]) methods.insert("PUT");
     return methods;
   }
 

@@ -147,6 +147,38 @@ TEST_F(ReadTrailTest, KeepsTheMeshOfAnErasedVolume) {
   EXPECT_THAT(entries(), ElementsAre("110104 success ann 192.0.2.5 mesh head - - 1"));
 }
 
+// A login of an OpenID provider is a name like others.
+TEST_F(ReadTrailTest, NamesTheSubjectOfALogin) {
+  note(kSlice, "head", 200, "oidc:248289761001");
+  note("/v1/volumes/{id}", "head", 404, "oidc:248289761001");
+  EXPECT_THAT(entries(),
+              ElementsAre("110104 success oidc:248289761001 192.0.2.5 slice head 1.2.3 PAT1 1",
+                          "110112 failure oidc:248289761001 192.0.2.5 volume head 1.2.3 PAT1 1"));
+}
+
+TEST_F(ReadTrailTest, HasWhatNeitherAVolumeNorAJobTells) {
+  Request request;
+  request.method = "GET";
+  request.context.caller.name = "ris";
+  request.remote_address = "192.0.2.5";
+  Response response;
+  response.told = ToldPatient{.what = "workitem", .study = "1.7", .patient_id = "PAT7"};
+  for (int n = 0; n < 3; ++n) trail_->note(request, response);
+  response.told->patient_id = "PAT8";
+  response.status = 403;
+  trail_->note(request, response);
+  trail_.reset();
+  EXPECT_THAT(entries(), ElementsAre("110112 success ris 192.0.2.5 workitem - 1.7 PAT7 1",
+                                     "110112 failure ris 192.0.2.5 workitem - 1.7 PAT8 1",
+                                     "110112 success ris 192.0.2.5 workitem - 1.7 PAT7 2"));
+}
+
+TEST_F(ReadTrailTest, HasOneTryOfWhatARoleDoesNotAllowASecond) {
+  for (int n = 0; n < 50; ++n) note("none", "", 403, "grafana", "POST");
+  note("none", "", 403, "", "POST");  // a page of another origin
+  EXPECT_THAT(entries(), ElementsAre("110113 failure grafana 192.0.2.5 permission - - - -"));
+}
+
 // Strangers could fill the trail otherwise.
 TEST_F(ReadTrailTest, HasOneRefusedLoginASecond) {
   for (int n = 0; n < 50; ++n) note(kSlice, "head", 401, "");

@@ -1,0 +1,46 @@
+// A label volume on the grid of a series: the same samples, perhaps in another order along an axis.
+// An AI that is given a series returns such a volume, often as NIfTI, whose rows go the other way.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/hospital/objects/segmentation.h"
+#include "server/store/blob_store.h"
+
+namespace isomesh::orders {
+
+struct LabelGrid {
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  SampleType type = SampleType::kUint8;
+  std::string samples;                       // the key of the blob of the label volume
+  std::array<bool, 3> is_flipped = {};       // along each axis of the images
+  std::array<double, 3> origin = {0, 0, 0};  // of the images
+  std::array<std::array<double, 3>, 3> steps = {};
+};
+
+// `images` is the geometry of the series. Throws Error kUnusableVolume, with the reason, for label
+// volumes that have other sizes, are elsewhere, or have labels that share values.
+LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>& dims,
+                     const Volume& labels);
+
+// Where the segments have samples, by segment, then by slice. `labels` are those of the segments.
+// Throws Error kCancelled, and kInternal if the blob is damaged.
+std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
+                                                std::span<const std::int64_t> labels,
+                                                const store::BlobStore& blobs,
+                                                const std::stop_token& stop);
+
+// The bits of those frames, in pieces, with the padding at the end.
+void write_frames(const LabelGrid& grid, std::span<const std::int64_t> labels,
+                  std::span<const dicom::SegmentationFrame> frames, const store::BlobStore& blobs,
+                  const std::stop_token& stop,
+                  const std::function<void(std::span<const std::byte>)>& write);
+
+}  // namespace isomesh::orders

@@ -1,0 +1,35 @@
+#include "server/hospital/orders/pattern.h"
+
+namespace isomesh::orders {
+namespace {
+
+char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+}  // namespace
+
+bool matches(std::string_view pattern, std::string_view text) {
+  // The last * seen, and the end of the text it matches so far: backtracking only ever extends that
+  // match.
+  std::size_t star = std::string_view::npos;
+  std::size_t star_text = 0;
+  std::size_t p = 0;
+  std::size_t t = 0;
+  while (t < text.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      star_text = t;
+    } else if (p < pattern.size() &&
+               (pattern[p] == '?' || lower_of(pattern[p]) == lower_of(text[t]))) {
+      ++p;
+      ++t;
+    } else if (star != std::string_view::npos) {
+      p = star + 1;
+      t = ++star_text;
+    } else {
+      return false;
+    }
+  }
+  return pattern.substr(p).find_first_not_of('*') == std::string_view::npos;
+}
+
+}  // namespace isomesh::orders

@@ -1,0 +1,194 @@
+#include "server/hospital/worklist/query.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "server/hospital/orders/pattern.h"
+#include "server/hospital/worklist/workitem.h"
+
+namespace isomesh::worklist {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kStateTag = "00741000";
+constexpr const char* kTransactionTag = "00081195";
+
+// The keywords of the attributes of workitems and of their codes.
+constexpr std::array kKeywords = {
+    std::pair("AccessionNumber", "00080050"),
+    std::pair("AdmissionID", "00380010"),
+    std::pair("CodeMeaning", "00080104"),
+    std::pair("CodeValue", "00080100"),
+    std::pair("CodingSchemeDesignator", "00080102"),
+    std::pair("ExpectedCompletionDateTime", "00404011"),
+    std::pair("HumanPerformerCodeSequence", "00404009"),
+    std::pair("InputInformationSequence", "00404021"),
+    std::pair("InputReadinessState", "00404041"),
+    std::pair("IssuerOfPatientID", "00100021"),
+    std::pair("PatientBirthDate", "00100030"),
+    std::pair("PatientID", "00100020"),
+    std::pair("PatientName", "00100010"),
+    std::pair("PatientSex", "00100040"),
+    std::pair("PerformedStationNameCodeSequence", "00404028"),
+    std::pair("PerformedWorkitemCodeSequence", "00404019"),
+    std::pair("ProcedureStepLabel", "00741204"),
+    std::pair("ProcedureStepState", kStateTag),
+    std::pair("ReferencedRequestSequence", "0040A370"),
+    std::pair("RequestedProcedureID", "00401001"),
+    std::pair("SOPClassUID", "00080016"),
+    std::pair("SOPInstanceUID", "00080018"),
+    std::pair("ScheduledHumanPerformersSequence", "00404034"),
+    std::pair("ScheduledProcedureStepModificationDateTime", "00404010"),
+    std::pair("ScheduledProcedureStepPriority", "00741200"),
+    std::pair("ScheduledProcedureStepStartDateTime", "00404005"),
+    std::pair("ScheduledStationClassCodeSequence", "00404026"),
+    std::pair("ScheduledStationGeographicLocationCodeSequence", "00404027"),
+    std::pair("ScheduledStationNameCodeSequence", "00404025"),
+    std::pair("ScheduledWorkitemCodeSequence", "00404018"),
+    std::pair("SeriesInstanceUID", "0020000E"),
+    std::pair("StudyInstanceUID", "0020000D"),
+    std::pair("UnifiedProcedureStepPerformedProcedureSequence", "00741216"),
+    std::pair("WorklistLabel", "00741202")};
+
+std::string tag_of(const std::string& parameter, std::string_view part) {
+  const auto* const known =
+      std::ranges::find(kKeywords, part, [](const auto& each) { return each.first; });
+  if (known != kKeywords.end()) return known->second;
+  std::string tag(part);
+  std::ranges::transform(tag, tag.begin(), [](char c) {
+    return c >= 'a' && c <= 'f' ? static_cast<char>(c - 32) : c;
+  });
+  const bool is_tag = tag.size() == 8 && tag.find_first_not_of("0123456789ABCDEF") == tag.npos;
+  if (!is_tag) {
+    throw invalid_parameter(parameter,
+                            "is no known keyword of an attribute; give its tag, as in 00741000");
+  }
+  // Whoever could search for it could guess it digit by digit.
+  if (tag == kTransactionTag) throw invalid_parameter(parameter, "cannot be searched for");
+  return tag;
+}
+
+std::size_t number_of(const std::string& name, const std::string& value) {
+  const auto number = parse_uint64(value);
+  if (!number) throw invalid_parameter(name, "must be a whole number");
+  return *number;
+}
+
+// The time zone at the end of a DT. Years are not confused with it: a zone is at most +1400.
+std::string_view without_zone(std::string_view moment) {
+  if (moment.size() <= 5) return moment;
+  const std::string_view zone = moment.substr(moment.size() - 5);
+  const bool is_zone = (zone.front() == '+' || zone.front() == '-') &&
+                       zone.find_first_not_of("0123456789", 1) == zone.npos &&
+                       zone.substr(1) <= "1400";
+  return is_zone ? moment.substr(0, moment.size() - 5) : moment;
+}
+
+// Compares as far as both are given: 2026 is before 20270101, and the same as 20261231.
+int compared(std::string_view left, std::string_view right) {
+  left = without_zone(left);
+  right = without_zone(right);
+  const std::size_t length = std::min(left.size(), right.size());
+  return left.substr(0, length).compare(right.substr(0, length));
+}
+
+// PS3.4, C.2.2.2.5: one moment, or a range with a hyphen.
+bool is_in_range(std::string_view wanted, std::string_view moment) {
+  const std::string_view bare = without_zone(wanted);
+  std::size_t hyphen = bare.find('-');
+  // The hyphen of a zone within a range is followed by another.
+  if (hyphen != bare.npos && without_zone(bare.substr(0, hyphen + 5)) == bare.substr(0, hyphen) &&
+      bare.find('-', hyphen + 1) != bare.npos) {
+    hyphen = bare.find('-', hyphen + 1);
+  }
+  if (hyphen == bare.npos) return compared(bare, moment) == 0;
+  const std::string_view from = bare.substr(0, hyphen);
+  const std::string_view to = bare.substr(hyphen + 1);
+  return (from.empty() || compared(from, moment) <= 0) && (to.empty() || compared(moment, to) <= 0);
+}
+
+bool is_one_of(std::string_view wanted, std::string_view uid) {
+  while (true) {
+    const std::size_t end = wanted.find_first_of(",\\");
+    if (wanted.substr(0, end) == uid) return true;
+    if (end == wanted.npos) return false;
+    wanted.remove_prefix(end + 1);
+  }
+}
+
+bool value_matches(const std::string& vr, const json& value, const std::string& wanted) {
+  if (value.is_object()) {  // of a name: its groups
+    return std::ranges::any_of(value, [&](const json& group) {
+      return group.is_string() && orders::matches(wanted, group.get_ref<const std::string&>());
+    });
+  }
+  if (value.is_null()) return false;
+  const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  if (vr == "UI") return is_one_of(wanted, text);
+  if (vr == "DA" || vr == "DT" || vr == "TM") return is_in_range(wanted, text);
+  return orders::matches(wanted, text);
+}
+
+bool attribute_matches(const DataSet& data, const std::vector<std::string>& path, std::size_t at,
+                       const std::string& wanted) {
+  const auto& values = values_of(data, path[at]);
+  if (at + 1 < path.size()) {
+    return std::ranges::any_of(values, [&](const json& item) {
+      return item.is_object() && attribute_matches(item, path, at + 1, wanted);
+    });
+  }
+  if (values.empty()) return false;
+  const auto vr = data.at(path[at]).at("vr").get<std::string>();
+  if (vr == "SQ") return false;
+  return std::ranges::any_of(values,
+                             [&](const json& value) { return value_matches(vr, value, wanted); });
+}
+
+}  // namespace
+
+std::optional<store::WorkitemState> Query::state() const {
+  using store::WorkitemState;
+  for (const auto& [path, value] : keys) {
+    if (path.size() != 1 || path.front() != kStateTag) continue;
+    for (const WorkitemState state : {WorkitemState::kScheduled, WorkitemState::kInProgress,
+                                      WorkitemState::kCompleted, WorkitemState::kCanceled}) {
+      if (value == to_string(state)) return state;
+    }
+  }
+  return std::nullopt;
+}
+
+Query parse_query(const std::vector<std::pair<std::string, std::string>>& parameters) {
+  constexpr std::size_t kMostKeys = 50;
+  Query query;
+  for (const auto& [name, value] : parameters) {
+    if (name == "limit") {
+      query.limit = std::min(number_of(name, value), kMostResults);
+    } else if (name == "offset") {
+      query.offset = number_of(name, value);
+    } else if (name == "includefield") {
+      continue;  // results have all attributes
+    } else if (name == "fuzzymatching") {
+      if (value == "true") throw invalid_parameter(name, "is not supported");
+    } else {
+      std::vector<std::string> path;
+      for (const std::string_view part : split(name, '.')) path.push_back(tag_of(name, part));
+      // An empty value matches everything.
+      if (!value.empty()) query.keys.emplace_back(std::move(path), value);
+      if (query.keys.size() > kMostKeys) throw invalid_parameter(name, "is one too many");
+    }
+  }
+  return query;
+}
+
+bool matches(const Query& query, const DataSet& data) {
+  return std::ranges::all_of(query.keys, [&](const auto& key) {
+    return attribute_matches(data, key.first, 0, key.second);
+  });
+}
+
+}  // namespace isomesh::worklist

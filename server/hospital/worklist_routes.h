@@ -1,0 +1,19 @@
+#pragma once
+
+#include "server/hospital/orders/settings.h"
+#include "server/hospital/records/workitem_store.h"
+#include "server/http/app/app.h"
+
+namespace isomesh::hospital {
+
+// What the routes of the own worklist need; all must outlive them.
+struct OwnWorklist {
+  const orders::WorklistSettings& settings;
+  store::WorkitemStore& workitems;
+};
+
+// UPS-RS (PS3.18, 11) without subscriptions. `worklist` is null if none is configured; the routes
+// then respond with that error.
+void add_worklist_routes(http::App& app, const OwnWorklist* worklist);
+
+}  // namespace isomesh::hospital

@@ -1,0 +1,91 @@
+// Searches of the own worklist.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "server/hospital/worklist/query.h"
+#include "tests/support/files.h"
+#include "tests/unit/hospital/worklist.h"
+
+namespace isomesh::worklist {
+namespace {
+
+bool finds(const std::string& name, const std::string& value) {
+  return matches(parse_query({{name, value}}), data_of(test::new_record()));
+}
+
+TEST(WorklistQuery, MatchesByKindOfValue) {
+  for (const auto& [name, value] : {
+           std::pair<std::string, std::string>{"ProcedureStepState", "SCHEDULED"},
+           {"00741000", "SCHEDULED"},
+           {"00741000", ""},
+           {"PatientID", "PAT-1"},
+           {"PatientID", "PAT*"},
+           {"PatientName", "doe^*"},
+           {"StudyInstanceUID", "1.6,1.7"},
+           {"0020000d", "1.7\\1.8"},
+           {"ScheduledWorkitemCodeSequence.CodeValue", "MESH"},
+           {"00404018.00080102", "99?"},
+           {"InputInformationSequence.SeriesInstanceUID", "1.7.1"},
+           {"ScheduledProcedureStepStartDateTime", "20260102"},
+           {"ScheduledProcedureStepStartDateTime", "20260101-20260103"},
+           {"ScheduledProcedureStepStartDateTime", "2026-2027"},
+           {"ScheduledProcedureStepStartDateTime", "20260102000000-0500-20260103000000-0500"},
+           {"ScheduledProcedureStepStartDateTime", "-20260102"},
+           {"ScheduledProcedureStepStartDateTime", "20260102030405-"},
+       }) {
+    EXPECT_TRUE(finds(name, value)) << name << '=' << value;
+  }
+  for (const auto& [name, value] : {
+           std::pair<std::string, std::string>{"ProcedureStepState", "COMPLETED"},
+           {"PatientID", "PAT"},
+           {"PatientName", "Roe*"},
+           {"StudyInstanceUID", "1.77"},
+           {"ScheduledWorkitemCodeSequence.CodeValue", "READ"},
+           {"ScheduledWorkitemCodeSequence", "MESH"},
+           {"PatientID.CodeValue", "PAT-1"},
+           {"AdmissionID", "*"},
+           {"ScheduledProcedureStepStartDateTime", "20260103-"},
+           {"ScheduledProcedureStepStartDateTime", "-2025"},
+           {"ScheduledProcedureStepStartDateTime", "20250101-20251231"},
+       }) {
+    EXPECT_FALSE(finds(name, value)) << name << '=' << value;
+  }
+}
+
+TEST(WorklistQuery, KnowsWhatItDoesNotSearchFor) {
+  for (const auto& [name, value] : {
+           std::pair<std::string, std::string>{"PatientsName", "x"},
+           {"0010001", "x"},
+           {"ScheduledWorkitemCodeSequence.", "x"},
+           {"fuzzymatching", "true"},
+           {"limit", "-1"},
+           {"offset", "x"},
+           {"TransactionUID", "1.99"},
+           {"00081195", "1*"},
+           {"00404021.00081195", "1*"},
+       }) {
+    const Error error = test::error_of(
+        [&, &from = name, &to = value] {
+          parse_query({{from, to}});
+        },
+        name);
+    ASSERT_EQ(error.code(), ErrorCode::kInvalidParameter) << name;
+    EXPECT_EQ(error.fields().front().field, name);
+  }
+}
+
+TEST(WorklistQuery, HasItsPlaceInTheList) {
+  const Query query = parse_query({{"limit", "5000"},
+                                   {"offset", "7"},
+                                   {"includefield", "all"},
+                                   {"fuzzymatching", "false"},
+                                   {"ProcedureStepState", "IN PROGRESS"}});
+  EXPECT_EQ(query.limit, kMostResults);
+  EXPECT_EQ(query.offset, 7U);
+  EXPECT_EQ(query.state(), store::WorkitemState::kInProgress);
+  EXPECT_EQ(parse_query({{"ProcedureStepState", "*"}}).state(), std::nullopt);
+}
+
+}  // namespace
+}  // namespace isomesh::worklist
