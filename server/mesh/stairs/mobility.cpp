@@ -83,8 +83,9 @@ class Finder {
   // Also what is owed for the bend alone, and the diffusivity.
   void find_bends(std::size_t v) {
     Lanes normal = {};
-    shape_.visit_spokes(
-        v, [&](std::size_t, const Spoke& spoke) { normal += shape_.normal(v, spoke); });
+    for (std::size_t fan = shape_.fans().begin(v); fan < shape_.fans().begin(v + 1); ++fan) {
+      normal += shape_.normal(fan);
+    }
     const Lanes in_samples = normal * shape_.spacing();
     const float size = length(in_samples);
     if (size > 0) found_.spread[v] = size / length(normal) / shape_.largest_spacing();
@@ -164,9 +165,8 @@ class Finder {
           shape_.neighbors().visit(
               v, [&](std::uint32_t neighbor) { most = larger(most, reach_[neighbor]); });
         } else if (step < kNoiseSteps) {
-          shape_.visit_spokes(v, [&](std::size_t, const Spoke& spoke) {
-            most[kNoise] = std::max(
-                {most[kNoise], reach_[spoke.next][kNoise], reach_[spoke.previous][kNoise]});
+          shape_.visit_triangles(v, [&](std::size_t, std::uint32_t a, std::uint32_t b) {
+            most[kNoise] = std::max({most[kNoise], reach_[a][kNoise], reach_[b][kNoise]});
           });
         }
         next[v] = larger(reach_[v], most - loss);

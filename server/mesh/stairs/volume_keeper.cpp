@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
 #include <utility>
 
 namespace isomesh::mesh {
@@ -11,23 +10,30 @@ namespace {
 
 // Sums over the triangles of a fan.
 struct FanSums {
-  Lanes normal = {};  // its length is twice the area
-  Lanes between = {};
-  float area = 0;  // of all, six times
+  Lanes normal = {};   // its length is twice the area
+  Lanes between = {};  // of the triangles half-way between those at the start and now, four times
+  float area = 0;      // of all, six times
 
-  // `between`: of the triangles half-way between those at the start and now, four times.
-  FanSums(const WallShape& shape, std::size_t v, std::span<const Spoke> spokes) {
+  FanSums(const WallShape& shape, std::size_t fan) {
+    struct Ways {
+      Lanes now;
+      Lanes both;  // at the start, and now
+    };
     const Buffer<Lanes>& start = shape.start();
-    const Lanes at = shape.at[v];
-    const Lanes twice = start[v] + at;
-    for (const Spoke& spoke : spokes) {
-      const Lanes next = shape.at[spoke.next];
-      const Lanes previous = shape.at[spoke.previous];
-      const Lanes here = cross(next - at, previous - at);
+    const std::uint32_t v = shape.fans().vertex(fan);
+    const Ways own = {shape.at[v], start[v] + shape.at[v]};
+    const auto load = [&](std::uint32_t each) {
+      const Lanes at = shape.at[each];
+      return Ways{at - own.now, start[each] + at - own.both};
+    };
+    shape.fans().visit_triangles(fan, load, [&](const Ways& a, const Ways& b) {
+      const Lanes here = twisted_cross(a.now, b.now);
       normal += here;
       area += length(here);
-      between += cross(start[spoke.next] + next - twice, start[spoke.previous] + previous - twice);
-    }
+      between += twisted_cross(a.both, b.both);
+    });
+    normal = rotated(normal);
+    between = rotated(between);
   }
 };
 
@@ -43,15 +49,9 @@ VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility, Buf
   normals_.resize_for_overwrite(fans.size());
   for_each(context, fans.size(), [&](std::size_t fan) {
     const std::size_t v = fans.vertex(fan);
-    Lanes normal = {};
-    float area = 0;
-    for (const Spoke& spoke : fans.spokes(fan)) {
-      const Lanes here = shape.normal(v, spoke);
-      normal += here;
-      area += length(here);
-    }
-    normals_[fan] = normal;
-    areas_[fan] = area / 6;
+    const FanSums sums(shape, fan);
+    normals_[fan] = sums.normal;
+    areas_[fan] = sums.area / 6;
     const auto count = static_cast<float>(fans.neighbors().degree(fan));
     kept_[fan] = 1 - mobility.spread[v];
     shares_[fan] = mobility.spread[v] / std::max(1.0F, count);
@@ -88,7 +88,7 @@ Buffer<float> VolumeKeeper::all_fans() const {
 
 Buffer<float> VolumeKeeper::diffused(Buffer<float> values, std::span<const float> series,
                                      Way way) const {
-  const Rings& neighbors = shape_.fans().neighbors();
+  const NeighborLists& neighbors = shape_.fans().neighbors();
   Buffer<float> before = all_fans();  // T[j - 2], then T[j]; values is T[j - 1]
   Buffer<float> sum = all_fans();
   Buffer<float> given;
@@ -123,7 +123,7 @@ Buffer<float> VolumeKeeper::offsets(const WallShape& shape, Buffer<Lanes>& norma
   Buffer<float> areas = all_fans();
   for_each(context_, fans.size(), [&](std::size_t fan) {
     const std::size_t v = fans.vertex(fan);
-    const FanSums sums(shape, v, fans.spokes(fan));
+    const FanSums sums(shape, fan);
     // A vertex has a part of the volume that each of its triangles has swept since the start in the
     // direction of its normal: its way times a third of the area vector, in the mean over the way.
     // The parts of the three corners add up to all of it.
