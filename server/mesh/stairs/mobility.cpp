@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include "server/mesh/stairs/waves.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -19,11 +21,11 @@ enum Reach { kOut, kIn, kNear, kNoise };
 // are several edges long, and only where their two bends reach each other is it a staircase. So
 // bends are passed on over six edges, and weaken with each.
 constexpr float kBendsPerSample = 10;
-constexpr int kBendSteps = 6;       // from edge to edge
-constexpr float kBendLoss = 0.12F;  // with each
-constexpr float kNothing = 2;       // more than any of them
+constexpr std::size_t kBendSteps = 6;  // from edge to edge
+constexpr float kBendLoss = 0.12F;     // with each
+constexpr float kNothing = 2;          // more than any of them
 // The walls' smoothing gives way to the curve's within four edges of it.
-constexpr int kCurveSteps = 4;
+constexpr std::size_t kCurveSteps = 4;
 constexpr float kCurveLoss = 0.2F;
 // A closed curve of fewer vertices is smoothed less, or it would shrink to a point: at this length
 // the strongest smoothing (stairs.cpp) leaves 0.94 of its radius.
@@ -32,7 +34,7 @@ constexpr std::size_t kLongCurve = 39;
 // along curves. Up to kNoisy a curve is calm; from twice as many on it is noise and stays. Noise on
 // a curve also counts as noise in the triangles beside it.
 constexpr int kCalmSteps = 4;
-constexpr int kNoiseSteps = 2;
+constexpr std::size_t kNoiseSteps = 2;
 constexpr float kNoisy = 0.15F;
 
 float clamped(float value) { return std::clamp(value, 0.0F, 1.0F); }
@@ -140,7 +142,7 @@ class Finder {
 
   void spread_curve_bends() {
     Buffer<float> next = filled(0.0F);
-    for (int step = 0; step < kBendSteps; ++step) {
+    for (std::size_t step = 0; step < kBendSteps; ++step) {
       for_curves([&](std::size_t v) {
         float most = 0;
         shape_.neighbors().visit(
@@ -155,24 +157,27 @@ class Finder {
   // farther away.
   void spread_reach() {
     const auto larger = [](Lanes a, Lanes b) { return a > b ? a : b; };
-    Buffer<Lanes> next = filled(Lanes{});
-    for (int step = 0; step < kBendSteps; ++step) {
-      const float near_loss = step == 0 ? 0 : step <= kCurveSteps ? kCurveLoss : kNothing;
-      const Lanes loss = {kBendLoss, kBendLoss, near_loss, step < kNoiseSteps ? 0 : kNothing};
-      for_vertices([&](std::size_t v) {
+    Buffer<Lanes> other = filled(Lanes{});
+    static_assert(kBendSteps % 2 == 0);  // the last writes to reach_
+    const std::array<Buffer<Lanes>*, 2> turns = {&reach_, &other};
+    const auto pass_on = [&](std::size_t step, std::size_t begin, std::size_t end) {
+      const float near_loss = step == 1 ? 0 : step <= kCurveSteps + 1 ? kCurveLoss : kNothing;
+      const Lanes loss = {kBendLoss, kBendLoss, near_loss, step <= kNoiseSteps ? 0 : kNothing};
+      const Buffer<Lanes>& from = *turns[(step - 1) % 2];
+      for (std::size_t v = begin; v < end; ++v) {
         Lanes most = {};
         if (!shape_.is_curve(v)) {
           shape_.neighbors().visit(
-              v, [&](std::uint32_t neighbor) { most = larger(most, reach_[neighbor]); });
-        } else if (step < kNoiseSteps) {
+              v, [&](std::uint32_t neighbor) { most = larger(most, from[neighbor]); });
+        } else if (step <= kNoiseSteps) {
           shape_.visit_triangles(v, [&](std::size_t, std::uint32_t a, std::uint32_t b) {
-            most[kNoise] = std::max({most[kNoise], reach_[a][kNoise], reach_[b][kNoise]});
+            most[kNoise] = std::max({most[kNoise], from[a][kNoise], from[b][kNoise]});
           });
         }
-        next[v] = larger(reach_[v], most - loss);
-      });
-      std::swap(reach_, next);
-    }
+        (*turns[step % 2])[v] = larger(from[v], most - loss);
+      }
+    };
+    in_waves(context_, shape_.blocks(), kBendSteps, pass_on);
   }
 
   // The number of vertices of a closed curve without junctions; for all others, kLongCurve.

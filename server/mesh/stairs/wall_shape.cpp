@@ -28,6 +28,13 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   if (to_space.determinant() < 0) spacing_[0] = -spacing_[0];
 
   const Mesh& mesh = surface.mesh;
+  blocks_ = {0};
+  for (const std::uint64_t first : mesh.layer_vertices) {
+    constexpr std::size_t kBlock = 2048;  // what some of them take stays in a cache of a mebibyte
+    if (first >= blocks_.back() + kBlock) blocks_.push_back(first);
+  }
+  if (blocks_.size() > 1) blocks_.pop_back();  // the last takes what is left
+  blocks_.push_back(mesh.positions.size());
   const std::array<std::uint32_t, 3> samples = {dims.x, dims.y, dims.z};
   start_.resize_for_overwrite(mesh.positions.size());
   flags_.resize_for_overwrite(mesh.positions.size());

@@ -43,6 +43,9 @@ class WallShape {
   std::size_t vertices() const { return start_.size(); }
   const WallFans& fans() const { return fans_; }
 
+  // Runs of vertices of whole layers, for in_waves: where they begin, and where the last ends.
+  std::span<const std::size_t> blocks() const { return blocks_; }
+
   // The positions of the vertices at the start, and now.
   const Buffer<Lanes>& start() const { return start_; }
   Buffer<Lanes> at;
@@ -63,6 +66,7 @@ class WallShape {
 
   // The way without what would lead out of that.
   Lanes kept(std::size_t v, Lanes way) const {
+    if (!is_held(v)) return way;
     for (int axis = 0; axis < 3; ++axis) {
       if ((flags_[v] >> axis & 1) != 0) way[axis] = 0;
     }
@@ -112,6 +116,7 @@ class WallShape {
   float smallest_spacing_ = 0;
   Lanes low_ = {};
   Lanes high_ = {};
+  std::vector<std::size_t> blocks_;
   Buffer<Lanes> start_;
   Buffer<std::uint8_t> flags_;
   WallFans fans_;
