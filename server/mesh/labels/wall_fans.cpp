@@ -4,104 +4,133 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
-namespace {
 
-struct Corner {
-  std::uint32_t vertex = 0;  // counted from the layer's first
+// A triangle at a vertex: its wall, and its other two corners, counter-clockwise.
+struct WallFans::Corner {
   Wall wall;
-  Spoke spoke;
+  std::uint32_t next = 0;
+  std::uint32_t previous = 0;
 };
-
-std::tuple<PartNumber, PartNumber, bool> key_of(const Wall& wall) {
-  return {wall.sides.front, wall.sides.back, wall.is_cap};
-}
 
 // Fans of the vertices of one layer.
-struct LayerFans {
+struct WallFans::Layer {
   std::vector<std::uint32_t> fans;  // of each vertex
-  std::vector<Wall> walls;
-  std::vector<std::uint32_t> sizes;  // in spokes
-  std::vector<Spoke> spokes;
+  std::vector<Wall> walls;          // of each fan, as all that follow
+  std::vector<Kind> kinds;
+  std::vector<std::uint32_t> sizes;
+  std::vector<std::uint32_t> ring;
 };
 
-// The corners at a layer's vertices, in the order of the triangles.
-std::vector<Corner> corners_of(const SeparatingSurface& surface, std::size_t layer,
-                               const std::function<bool(const Triangle&)>& is_cap) {
+WallFans::Kind WallFans::append_ring(std::span<const Corner> fan,
+                                     std::vector<std::uint32_t>& ring) {
+  const std::size_t begin = ring.size();
+  const auto is_complete = [&] { return ring.size() == begin + fan.size(); };
+  // From triangle to triangle, until all were seen, none follows, or that is the first again.
+  const auto walk = [&](auto first) {
+    auto at = first;
+    auto last = at;
+    do {
+      ring.push_back(at->next);
+      last = at;
+      at = std::ranges::find(fan, at->previous, &Corner::next);
+    } while (at != fan.end() && at != first && !is_complete());
+    return std::pair(last, at);
+  };
+  if (walk(fan.begin()).second == fan.begin() && is_complete()) return Kind::kClosed;
+  ring.resize(begin);
+  const auto first = std::ranges::find_if(fan, [&](const Corner& corner) {
+    return std::ranges::find(fan, corner.next, &Corner::previous) == fan.end();
+  });
+  if (first != fan.end()) {
+    const auto [last, end] = walk(first);
+    if (end == fan.end() && is_complete()) {
+      ring.push_back(last->previous);
+      return Kind::kOpen;
+    }
+    ring.resize(begin);
+  }
+  for (const Corner& corner : fan) ring.insert(ring.end(), {corner.next, corner.previous});
+  return Kind::kLoose;
+}
+
+WallFans::Layer WallFans::layer_of(const SeparatingSurface& surface,
+                                   std::span<const std::uint8_t> faces, std::size_t layer) {
   const Mesh& mesh = surface.mesh;
   const std::uint64_t first = mesh.layer_vertices[layer];
-  const std::uint64_t count = mesh.layer_vertices[layer + 1] - first;
-  std::vector<Corner> corners;
-  const std::uint64_t begin = mesh.layer_triangles[layer == 0 ? 0 : layer - 1];
-  for (std::uint64_t t = begin; t < mesh.layer_triangles[layer + 1]; ++t) {
-    const Triangle& triangle = mesh.triangles[t];
-    const auto is_here = [&](std::uint32_t v) { return v - first < count; };
-    if (std::ranges::none_of(triangle, is_here)) continue;
-    const Wall wall = {surface.sides[t], is_cap(triangle)};
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!is_here(triangle[i])) continue;
-      corners.push_back({static_cast<std::uint32_t>(triangle[i] - first),
-                         wall,
-                         {triangle[(i + 1) % 3], triangle[(i + 2) % 3]}});
-    }
-  }
-  return corners;
-}
-
-std::vector<Corner> sorted_by_vertex(const std::vector<Corner>& corners, std::size_t vertices) {
-  std::vector<std::uint32_t> next(vertices + 1, 0);
-  for (const Corner& corner : corners) ++next[corner.vertex + 1];
-  for (std::size_t v = 0; v < vertices; ++v) next[v + 1] += next[v];
-  std::vector<Corner> sorted(corners.size());
-  for (const Corner& corner : corners) sorted[next[corner.vertex]++] = corner;
-  return sorted;
-}
-
-LayerFans fans_of(const SeparatingSurface& surface, std::size_t layer,
-                  const std::function<bool(const Triangle&)>& is_cap) {
-  const std::size_t vertices =
-      surface.mesh.layer_vertices[layer + 1] - surface.mesh.layer_vertices[layer];
-  std::vector<Corner> corners = sorted_by_vertex(corners_of(surface, layer, is_cap), vertices);
-  LayerFans result;
-  result.fans.assign(vertices, 0);
-  for (auto at = corners.begin(); at != corners.end();) {
-    const auto end =
-        std::find_if(at, corners.end(), [&](const Corner& c) { return c.vertex != at->vertex; });
-    const bool is_one_wall =
-        std::all_of(at, end, [&](const Corner& corner) { return corner.wall == at->wall; });
-    const auto by_wall = [](const Corner& corner) { return key_of(corner.wall); };
-    if (!is_one_wall) std::ranges::stable_sort(at, end, {}, by_wall);
-    for (; at != end; ++at) {
-      if (result.fans[at->vertex] == 0 || result.walls.back() != at->wall) {
-        ++result.fans[at->vertex];
-        result.walls.push_back(at->wall);
-        result.sizes.push_back(0);
+  const std::uint64_t vertices = mesh.layer_vertices[layer + 1] - first;
+  const std::uint64_t low = mesh.layer_triangles[layer == 0 ? 0 : layer - 1];
+  const std::uint64_t high = mesh.layer_triangles[layer + 1];
+  const auto visit_corners = [&](const auto& visit) {
+    for (std::uint64_t t = low; t < high; ++t) {
+      for (std::uint32_t i = 0; i < 3; ++i) {
+        const std::uint64_t v = mesh.triangles[t][i] - first;
+        if (v < vertices) visit(v, static_cast<std::uint32_t>(t - low) * 3 + i);
       }
-      ++result.sizes.back();
-      result.spokes.push_back(at->spoke);
+    }
+  };
+  // By vertex: first where its corners begin, and then where they end.
+  std::vector<std::uint32_t> ends(vertices + 1, 0);
+  visit_corners([&](std::uint64_t v, std::uint32_t) { ++ends[v + 1]; });
+  for (std::size_t v = 0; v < vertices; ++v) ends[v + 1] += ends[v];
+  std::vector<std::uint32_t> sorted(ends[vertices]);
+  visit_corners([&](std::uint64_t v, std::uint32_t corner) { sorted[ends[v]++] = corner; });
+
+  Layer result;
+  result.fans.assign(vertices, 0);
+  result.walls.reserve(vertices + vertices / 4);
+  result.kinds.reserve(vertices + vertices / 4);
+  result.sizes.reserve(vertices + vertices / 4);
+  result.ring.reserve(sorted.size() + sorted.size() / 8);
+  std::vector<Corner> corners;
+  std::uint32_t begin = 0;
+  for (std::size_t v = 0; v < vertices; begin = ends[v++]) {
+    corners.clear();
+    for (std::uint32_t n = begin; n < ends[v]; ++n) {
+      const std::uint64_t t = low + sorted[n] / 3;
+      const Triangle& triangle = mesh.triangles[t];
+      const auto& [a, b, c] = triangle;
+      const std::uint32_t i = sorted[n] % 3;
+      const bool is_cap = !faces.empty() && (faces[a] & faces[b] & faces[c]) != 0;
+      corners.push_back({{surface.sides[t], is_cap}, triangle[(i + 1) % 3], triangle[(i + 2) % 3]});
+    }
+    const auto key_of = [](const Corner& corner) {
+      const auto& [sides, is_cap] = corner.wall;
+      return std::tuple(sides.front, sides.back, is_cap);
+    };
+    const bool is_one_wall = std::ranges::all_of(
+        corners, [&](const Corner& corner) { return corner.wall == corners[0].wall; });
+    if (!is_one_wall) std::ranges::stable_sort(corners, {}, key_of);
+    for (auto at = corners.begin(), end = at; at != corners.end(); at = end) {
+      end = std::find_if(at, corners.end(),
+                         [&](const Corner& corner) { return corner.wall != at->wall; });
+      const std::size_t before = result.ring.size();
+      ++result.fans[v];
+      result.walls.push_back(at->wall);
+      result.kinds.push_back(append_ring({at, end}, result.ring));
+      result.sizes.push_back(static_cast<std::uint32_t>(result.ring.size() - before));
     }
   }
   return result;
 }
 
-}  // namespace
-
-WallFans::WallFans(const SeparatingSurface& surface,
-                   const std::function<bool(const Triangle&)>& is_cap, const Context& context) {
+WallFans::WallFans(const SeparatingSurface& surface, std::span<const std::uint8_t> faces,
+                   const Context& context) {
   const Mesh& mesh = surface.mesh;
   const std::size_t layers = mesh.layers();
-  std::vector<LayerFans> all(layers);
+  std::vector<Layer> all(layers);
   parallel_for(context, layers,
-               [&](std::size_t layer) { all[layer] = fans_of(surface, layer, is_cap); });
+               [&](std::size_t layer) { all[layer] = layer_of(surface, faces, layer); });
 
   std::vector<std::uint64_t> fans_before(layers + 1, 0);
-  std::vector<std::uint64_t> spokes_before(layers + 1, 0);
+  std::vector<std::uint64_t> ring_before(layers + 1, 0);
   for (std::size_t layer = 0; layer < layers; ++layer) {
     fans_before[layer + 1] = fans_before[layer] + all[layer].walls.size();
-    spokes_before[layer + 1] = spokes_before[layer] + all[layer].spokes.size();
+    ring_before[layer + 1] = ring_before[layer] + all[layer].ring.size();
   }
   if (fans_before[layers] > std::numeric_limits<std::int32_t>::max()) {
     throw Error(ErrorCode::kTooLarge,
@@ -111,23 +140,25 @@ WallFans::WallFans(const SeparatingSurface& surface,
   first_.resize_for_overwrite(mesh.positions.size() + 1);
   vertex_.resize_for_overwrite(fans_before[layers]);
   walls_.resize_for_overwrite(fans_before[layers]);
-  spokes_begin_.resize_for_overwrite(fans_before[layers] + 1);
-  spokes_.resize_for_overwrite(spokes_before[layers]);
+  kinds_.resize_for_overwrite(fans_before[layers]);
+  ring_begin_.resize_for_overwrite(fans_before[layers] + 1);
+  ring_.resize_for_overwrite(ring_before[layers]);
   first_[mesh.positions.size()] = static_cast<std::uint32_t>(fans_before[layers]);
-  spokes_begin_[fans_before[layers]] = spokes_before[layers];
+  ring_begin_[fans_before[layers]] = ring_before[layers];
   parallel_for(context, layers, [&](std::size_t layer) {
-    LayerFans& here = all[layer];
+    Layer& here = all[layer];
     std::ranges::copy(here.walls, walls_.begin() + fans_before[layer]);
-    std::ranges::copy(here.spokes, spokes_.begin() + spokes_before[layer]);
+    std::ranges::copy(here.kinds, kinds_.begin() + fans_before[layer]);
+    std::ranges::copy(here.ring, ring_.begin() + ring_before[layer]);
     std::uint64_t fan = fans_before[layer];
-    std::uint64_t spoke = spokes_before[layer];
+    std::uint64_t begin = ring_before[layer];
     for (std::size_t v = 0; v < here.fans.size(); ++v) {
       const std::uint64_t vertex = mesh.layer_vertices[layer] + v;
       first_[vertex] = static_cast<std::uint32_t>(fan);
       for (std::uint32_t n = 0; n < here.fans[v]; ++n, ++fan) {
         vertex_[fan] = static_cast<std::uint32_t>(vertex);
-        spokes_begin_[fan] = spoke;
-        spoke += here.sizes[fan - fans_before[layer]];
+        ring_begin_[fan] = begin;
+        begin += here.sizes[fan - fans_before[layer]];
       }
     }
     here = {};
@@ -143,11 +174,11 @@ std::uint32_t WallFans::find(std::size_t vertex, const Wall& wall) const {
 }
 
 void WallFans::find_neighbors(const Context& context) {
-  neighbors_ = Rings(size(), context, [&](std::size_t fan, std::vector<std::uint32_t>& list) {
-    for (const Spoke& spoke : spokes(fan)) list.push_back(spoke.next);
-    // A fan that is open has an end that is only a previous corner.
-    for (const Spoke& spoke : spokes(fan)) {
-      if (std::ranges::find(list, spoke.previous) == list.end()) list.push_back(spoke.previous);
+  neighbors_ = NeighborLists(size(), context, [&](std::size_t fan, auto& list) {
+    list.assign(ring_.begin() + ring_begin_[fan], ring_.begin() + ring_begin_[fan + 1]);
+    if (kinds_[fan] == Kind::kLoose) {
+      std::ranges::sort(list);
+      list.erase(std::unique(list.begin(), list.end()), list.end());
     }
     for (std::uint32_t& each : list) each = find(each, walls_[fan]);
   });
@@ -155,11 +186,12 @@ void WallFans::find_neighbors(const Context& context) {
 
 std::uint64_t WallFans::bytes(std::uint64_t vertices, std::uint64_t triangles) {
   // A vertex where three walls meet has three fans. A quarter of all vertices is a high estimate.
+  // An open ring has one corner more than triangles.
   const std::uint64_t fans = vertices + vertices / 2;
-  const std::uint64_t kept = fans * (sizeof(std::uint32_t) + sizeof(Wall) + sizeof(std::uint64_t)) +
-                             Rings::bytes(fans) + 3 * triangles * sizeof(Spoke) +
-                             vertices * sizeof(std::uint32_t);
-  return kept + 3 * triangles * sizeof(Spoke) + fans * sizeof(Wall);  // while they are gathered
+  const std::uint64_t gathered =
+      fans * (sizeof(Wall) + sizeof(Kind)) + (3 * triangles + fans) * sizeof(std::uint32_t);
+  return 2 * gathered + NeighborLists::bytes(fans) + vertices * sizeof(std::uint32_t) +
+         fans * (sizeof(std::uint32_t) + sizeof(std::uint64_t));
 }
 
 }  // namespace isomesh::mesh

@@ -3,22 +3,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
-#include "server/mesh/labels/rings.h"
+#include "server/mesh/labels/neighbor_lists.h"
 #include "server/mesh/labels/separate.h"
 
 namespace isomesh::mesh {
-
-// The two corners of a triangle that follow a vertex, counter-clockwise.
-struct Spoke {
-  std::uint32_t next = 0;
-  std::uint32_t previous = 0;
-};
 
 // A wall as a vertex sees it: between two parts (label_parts.h), or a cap of one.
 struct Wall {
@@ -36,10 +29,10 @@ class WallFans {
 
   WallFans() = default;
 
-  // `is_cap` tells triangles of caps, which make walls of their own; it is called from several
-  // threads. `surface` need not outlive this. Throws Error kCancelled, and kTooLarge when 31 bits
-  // cannot number all fans.
-  WallFans(const SeparatingSurface& surface, const std::function<bool(const Triangle&)>& is_cap,
+  // `faces`: the faces of a box that each vertex is in, a bit each; triangles in one are caps,
+  // which make walls of their own. Empty if there are none. Neither it nor `surface` need outlive
+  // this. Throws Error kCancelled, and kTooLarge when 31 bits cannot number all fans.
+  WallFans(const SeparatingSurface& surface, std::span<const std::uint8_t> faces,
            const Context& context);
 
   std::size_t size() const { return vertex_.size(); }
@@ -52,26 +45,52 @@ class WallFans {
   // The fan of that vertex and wall, or kNone.
   std::uint32_t find(std::size_t vertex, const Wall& wall) const;
 
-  // One for each of its triangles, in the surface's order.
-  std::span<const Spoke> spokes(std::size_t fan) const {
-    return spokes_.span().subspan(spokes_begin_[fan], spokes_begin_[fan + 1] - spokes_begin_[fan]);
+  // True if its triangles go around the vertex once.
+  bool is_closed(std::size_t fan) const { return kinds_[fan] == Kind::kClosed; }
+
+  // Calls add(load(a), load(b)) for the other two corners of each of its triangles, with those
+  // counter-clockwise. Triangles follow each other around the vertex, so load() is called once for
+  // a corner that two of them have.
+  template <class Load, class Add>
+  void visit_triangles(std::size_t fan, const Load& load, const Add& add) const {
+    const std::uint32_t* at = ring_.data() + ring_begin_[fan];
+    const std::uint32_t* const end = ring_.data() + ring_begin_[fan + 1];
+    if (kinds_[fan] == Kind::kLoose) {
+      for (; at != end; at += 2) add(load(at[0]), load(at[1]));
+      return;
+    }
+    auto before = load(kinds_[fan] == Kind::kOpen ? *at++ : end[-1]);
+    for (; at != end; ++at) {
+      const auto here = load(*at);
+      add(before, here);
+      before = here;
+    }
   }
 
   // By fan, those of the same wall at the vertices that its triangles join it with.
-  const Rings& neighbors() const { return neighbors_; }
+  const NeighborLists& neighbors() const { return neighbors_; }
 
   // An upper estimate of the memory for a surface of that size.
   static std::uint64_t bytes(std::uint64_t vertices, std::uint64_t triangles);
 
  private:
+  // Of its other corners: around the vertex, from one end to the other, or by triangle.
+  enum class Kind : std::uint8_t { kClosed, kOpen, kLoose };
+  struct Corner;
+  struct Layer;
+
+  static Layer layer_of(const SeparatingSurface& surface, std::span<const std::uint8_t> faces,
+                        std::size_t layer);
+  static Kind append_ring(std::span<const Corner> fan, std::vector<std::uint32_t>& ring);
   void find_neighbors(const Context& context);
 
   Buffer<std::uint32_t> first_;   // of each vertex, and all
   Buffer<std::uint32_t> vertex_;  // of each fan
   Buffer<Wall> walls_;
-  Buffer<std::uint64_t> spokes_begin_;
-  Buffer<Spoke> spokes_;
-  Rings neighbors_;
+  Buffer<Kind> kinds_;
+  Buffer<std::uint64_t> ring_begin_;  // of each fan, and all
+  Buffer<std::uint32_t> ring_;
+  NeighborLists neighbors_;
 };
 
 }  // namespace isomesh::mesh

@@ -1,9 +1,11 @@
 #include "server/mesh/stairs/filter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
+
+#include "server/mesh/stairs/waves.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -40,26 +42,30 @@ std::vector<float> flat_series(int degree, double time) {
 void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>& shares,
             std::span<const float> series, const Context& context, WallShape& shape) {
   Buffer<Lanes> first;
-  Buffer<Lanes> before;                          // T[j - 2], then T[j]
-  Buffer<Lanes> now;                             // T[j - 1]
   first.resize_for_overwrite(shape.vertices());  // only of those that move
-  for (Buffer<Lanes>* const each : {&before, &now}) {
-    each->resize_for_overwrite(shape.vertices());
+  std::array<Buffer<Lanes>, 2> values;           // T[j], by whether j is odd
+  for (Buffer<Lanes>& each : values) {
+    each.resize_for_overwrite(shape.vertices());
     for_chunks(context, shape.vertices(), [&](std::size_t begin, std::size_t end) {
-      std::copy(shape.at.begin() + begin, shape.at.begin() + end, each->begin() + begin);
+      std::copy(shape.at.begin() + begin, shape.at.begin() + end, each.begin() + begin);
     });
   }
-  for (std::size_t j = 1; j < series.size(); ++j) {
-    for_each(context, vertices.size(), [&](std::size_t i) {
-      const std::size_t v = vertices[i];
-      const Lanes step = shape.kept(v, shares[v] * (shape.mean(v, now) - now[v]));
-      const Lanes moved = now[v] + step;
-      if (j == 1) first[v] = now[v];
-      before[v] = j == 1 ? moved : 2.0F * moved - before[v];
-      shape.at[v] += series[j] * (before[v] - first[v]);  // the sum of all is 1
-    });
-    std::swap(before, now);
+  std::vector<std::size_t> bounds;
+  for (const std::size_t block : shape.blocks()) {
+    bounds.push_back(std::ranges::lower_bound(vertices, block) - vertices.begin());
   }
+  in_waves(
+      context, bounds, series.size() - 1, [&](std::size_t j, std::size_t begin, std::size_t end) {
+        const Buffer<Lanes>& now = values[(j - 1) % 2];
+        Buffer<Lanes>& next = values[j % 2];
+        for (std::size_t i = begin; i < end; ++i) {
+          const std::size_t v = vertices[i];
+          const Lanes moved = now[v] + shape.kept(v, shares[v] * (shape.mean(v, now) - now[v]));
+          if (j == 1) first[v] = now[v];
+          next[v] = j == 1 ? moved : 2.0F * moved - next[v];
+          shape.at[v] += series[j] * (next[v] - first[v]);  // the sum of all is 1
+        }
+      });
 }
 
 }  // namespace isomesh::mesh

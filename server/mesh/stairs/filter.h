@@ -14,8 +14,8 @@ namespace isomesh::mesh {
 // constants are preserved.
 std::vector<float> diffusion_series(int degree, double time);  // exp(-time k)
 std::vector<float> flat_series(int degree, double time);       // (1 + time k) exp(-time k)
-// Moves those vertices by the polynomial of the step that goes `shares[v]` of the way to the mean
-// of a vertex's neighbours; all others stay. Throws Error kCancelled.
+// Moves those vertices, which are ascending, by the polynomial of the step that goes `shares[v]` of
+// the way to the mean of a vertex's neighbours; all others stay. Throws Error kCancelled.
 void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>& shares,
             std::span<const float> series, const Context& context, WallShape& shape);
 

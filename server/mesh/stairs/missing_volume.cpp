@@ -180,20 +180,25 @@ class VoxelShares {
 
 // The volume that a fan's part of its triangles sweeps between two places of their vertices: the
 // vertex's way times a third of the area vector, in the mean over the way.
-float swept(std::size_t v, std::span<const Spoke> spokes, const Buffer<Lanes>& from,
+float swept(const WallFans& fans, std::size_t fan, const Buffer<Lanes>& from,
             const Buffer<Lanes>& to) {
-  const Lanes a = from[v];
-  const Lanes b = to[v];
+  struct Ways {
+    Lanes from;
+    Lanes to;
+  };
+  const std::uint32_t v = fans.vertex(fan);
+  const Ways own = {from[v], to[v]};
   Lanes area = {};  // times 12
-  for (const Spoke& spoke : spokes) {
-    const Lanes next_from = from[spoke.next] - a;
-    const Lanes next_to = to[spoke.next] - b;
-    const Lanes previous_from = from[spoke.previous] - a;
-    const Lanes previous_to = to[spoke.previous] - b;
-    area += cross(next_from, 2.0F * previous_from + previous_to) +
-            cross(next_to, 2.0F * previous_to + previous_from);
-  }
-  return dot(b - a, area) / 36;
+  fans.visit_triangles(
+      fan,
+      [&](std::uint32_t each) {
+        return Ways{from[each] - own.from, to[each] - own.to};
+      },
+      [&](const Ways& a, const Ways& b) {
+        area += twisted_cross(a.from, b.from) + twisted_cross(a.to, b.to) +
+                twisted_cross(a.from + a.to, b.from + b.to);
+      });
+  return dot(own.to - own.from, rotated(area)) / 36;
 }
 
 }  // namespace
@@ -221,7 +226,7 @@ Buffer<float> missing_volume(const Lattice<T>& lattice, Scheme scheme,
     const std::size_t first = fans.begin(v);
     const std::size_t count = fans.begin(v + 1) - first;
     for (std::size_t fan = first; fan < first + count; ++fan) {
-      missing[fan] = -swept(v, fans.spokes(fan), places, shape.start());
+      missing[fan] = -swept(fans, fan, places, shape.start());
     }
     if (owners[v].is_whole != 0 && count == 1) {
       missing[first] += voxel * shares.of_whole(owners[v]);

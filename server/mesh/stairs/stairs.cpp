@@ -188,7 +188,7 @@ std::uint64_t stairs_memory(const SurfaceSize& size) {
   // Places: as extracted, now, and three in a filter; shares and areas in single precision.
   constexpr std::uint64_t kBytesPerVertex = 5 * sizeof(Lanes) + 16 * sizeof(float);
   constexpr std::uint64_t kBytesPerFan = 2 * sizeof(Lanes) + 10 * sizeof(float);
-  return WallFans::bytes(size.vertices, size.triangles) + Rings::bytes(size.vertices) +
+  return WallFans::bytes(size.vertices, size.triangles) + NeighborLists::bytes(size.vertices) +
          size.vertices * (kBytesPerVertex + kBytesPerFan * 3 / 2);
 }
 

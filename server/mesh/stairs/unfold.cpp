@@ -29,10 +29,11 @@ bool is_less(Lanes a, Lanes b, float cosine) {
   return product < 0 || product * product < cosine * cosine * dot(a, a) * dot(b, b);
 }
 
-// A triangle that lies away from the normal of a fan that it is in.
+// A triangle that lies away from the normal of a fan that it is in, and its other two corners.
 struct Candidate {
   std::uint32_t fan = 0;
-  Spoke spoke;
+  std::uint32_t next = 0;
+  std::uint32_t previous = 0;
 };
 
 // If the triangle is away from the sum of its corners' own normals, it is away from one of them.
@@ -47,14 +48,12 @@ WallNormals normals_of(const WallShape& shape, const Context& context,
   normals.near.resize_for_overwrite(fans.size());
   candidates.resize(chunks_of(fans.size()));
   for_each(context, fans.size(), [&](std::size_t fan) {
-    const std::size_t v = fans.vertex(fan);
-    Lanes sum = {};
-    for (const Spoke& spoke : fans.spokes(fan)) sum += shape.normal(v, spoke);
-    normals.own[fan] = sum;
-    for (const Spoke& spoke : fans.spokes(fan)) {
-      if (!is_less(shape.normal(v, spoke), sum, kSuspect)) continue;
-      candidates[fan / kChunk].push_back({static_cast<std::uint32_t>(fan), spoke});
-    }
+    const std::uint32_t v = fans.vertex(fan);
+    const Lanes sum = normals.own[fan] = shape.normal(fan);
+    fans.visit_triangles(fan, std::identity(), [&](std::uint32_t a, std::uint32_t b) {
+      if (!is_less(normal_of(shape, {v, a, b}), sum, kSuspect)) return;
+      candidates[fan / kChunk].push_back({static_cast<std::uint32_t>(fan), a, b});
+    });
   });
   for_each(context, fans.size(), [&](std::size_t fan) {
     Lanes sum = normals.own[fan];
@@ -71,11 +70,11 @@ std::vector<Suspect> find_suspects(const WallShape& shape, const Context& contex
   const WallFans& fans = shape.fans();
   std::vector<std::vector<Suspect>> found(candidates.size());
   const auto look_at = [&](const Candidate& candidate, std::vector<Suspect>& suspects) {
-    const std::uint32_t v = fans.vertex(candidate.fan);
-    const auto& [next, previous] = candidate.spoke;
-    const Wall& wall = fans.wall(candidate.fan);
+    const auto& [fan, next, previous] = candidate;
+    const std::uint32_t v = fans.vertex(fan);
+    const Wall& wall = fans.wall(fan);
     const std::array corners = {v, next, previous};
-    const std::array own = {candidate.fan, fans.find(next, wall), fans.find(previous, wall)};
+    const std::array own = {fan, fans.find(next, wall), fans.find(previous, wall)};
     const Lanes normal = normal_of(shape, corners);
     Lanes near = {};
     for (std::size_t i = 0; i < 3; ++i) {

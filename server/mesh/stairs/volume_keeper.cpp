@@ -3,31 +3,39 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
 #include <utility>
+
+#include "server/mesh/stairs/waves.h"
 
 namespace isomesh::mesh {
 namespace {
 
 // Sums over the triangles of a fan.
 struct FanSums {
-  Lanes normal = {};  // its length is twice the area
-  Lanes between = {};
-  float area = 0;  // of all, six times
+  Lanes normal = {};   // its length is twice the area
+  Lanes between = {};  // of the triangles half-way between those at the start and now, four times
+  float area = 0;      // of all, six times
 
-  // `between`: of the triangles half-way between those at the start and now, four times.
-  FanSums(const WallShape& shape, std::size_t v, std::span<const Spoke> spokes) {
+  FanSums(const WallShape& shape, std::size_t fan) {
+    struct Ways {
+      Lanes now;
+      Lanes both;  // at the start, and now
+    };
     const Buffer<Lanes>& start = shape.start();
-    const Lanes at = shape.at[v];
-    const Lanes twice = start[v] + at;
-    for (const Spoke& spoke : spokes) {
-      const Lanes next = shape.at[spoke.next];
-      const Lanes previous = shape.at[spoke.previous];
-      const Lanes here = cross(next - at, previous - at);
+    const std::uint32_t v = shape.fans().vertex(fan);
+    const Ways own = {shape.at[v], start[v] + shape.at[v]};
+    const auto load = [&](std::uint32_t each) {
+      const Lanes at = shape.at[each];
+      return Ways{at - own.now, start[each] + at - own.both};
+    };
+    shape.fans().visit_triangles(fan, load, [&](const Ways& a, const Ways& b) {
+      const Lanes here = twisted_cross(a.now, b.now);
       normal += here;
       area += length(here);
-      between += cross(start[spoke.next] + next - twice, start[spoke.previous] + previous - twice);
-    }
+      between += twisted_cross(a.both, b.both);
+    });
+    normal = rotated(normal);
+    between = rotated(between);
   }
 };
 
@@ -37,21 +45,16 @@ VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility, Buf
                            const std::vector<float>& series, const Context& context)
     : shape_(shape), mobility_(mobility), series_(series), context_(context) {
   const WallFans& fans = shape.fans();
+  for (const std::size_t block : shape.blocks()) blocks_.push_back(fans.begin(block));
   for (Buffer<float>* const each : {&kept_, &shares_, &areas_}) {
     each->resize_for_overwrite(fans.size());
   }
   normals_.resize_for_overwrite(fans.size());
   for_each(context, fans.size(), [&](std::size_t fan) {
     const std::size_t v = fans.vertex(fan);
-    Lanes normal = {};
-    float area = 0;
-    for (const Spoke& spoke : fans.spokes(fan)) {
-      const Lanes here = shape.normal(v, spoke);
-      normal += here;
-      area += length(here);
-    }
-    normals_[fan] = normal;
-    areas_[fan] = area / 6;
+    const FanSums sums(shape, fan);
+    normals_[fan] = sums.normal;
+    areas_[fan] = sums.area / 6;
     const auto count = static_cast<float>(fans.neighbors().degree(fan));
     kept_[fan] = 1 - mobility.spread[v];
     shares_[fan] = mobility.spread[v] / std::max(1.0F, count);
@@ -59,7 +62,7 @@ VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility, Buf
   find_areas();
   // Half-way to the mean, twice: the owner of a vertex has all that its neighbours have a part in.
   constexpr std::array<float, 3> kHalfWays = {0.375F, 0.5F, 0.125F};
-  missing_ = diffused(std::move(missing), kHalfWays, Way::kSpread);
+  missing_ = spread(std::move(missing), kHalfWays);
 }
 
 void VolumeKeeper::hold_curves() {
@@ -77,7 +80,7 @@ void VolumeKeeper::find_areas() {
     const std::size_t v = shape_.fans().vertex(fan);
     room[fan] = may_move(v) ? areas_[fan] * mobility_.owes[v] : 0;
   });
-  room_ = diffused(std::move(room), series_, Way::kSpread);
+  room_ = spread(std::move(room), series_);
 }
 
 Buffer<float> VolumeKeeper::all_fans() const {
@@ -86,29 +89,30 @@ Buffer<float> VolumeKeeper::all_fans() const {
   return values;
 }
 
-Buffer<float> VolumeKeeper::diffused(Buffer<float> values, std::span<const float> series,
-                                     Way way) const {
-  const Rings& neighbors = shape_.fans().neighbors();
-  Buffer<float> before = all_fans();  // T[j - 2], then T[j]; values is T[j - 1]
+Buffer<float> VolumeKeeper::averaged(Buffer<float> values, std::span<const float> series) const {
+  const NeighborLists& neighbors = shape_.fans().neighbors();
+  Buffer<float> other = all_fans();
   Buffer<float> sum = all_fans();
-  Buffer<float> given;
-  if (way == Way::kSpread) given = all_fans();
-  for (std::size_t j = 1; j < series.size(); ++j) {
-    if (way == Way::kSpread) {
-      for_each(context_, values.size(),
-               [&](std::size_t fan) { given[fan] = values[fan] * shares_[fan]; });
-    }
-    const Buffer<float>& from = way == Way::kSpread ? given : values;
-    for_each(context_, values.size(), [&](std::size_t fan) {
-      float mean = neighbors.sum(fan, from);
-      if (way == Way::kAverage) mean *= shares_[fan];
-      const float step = mean + kept_[fan] * values[fan];
-      before[fan] = j == 1 ? step : 2 * step - before[fan];
-      sum[fan] = (j == 1 ? series[0] * values[fan] : sum[fan]) + series[j] * before[fan];
-    });
-    std::swap(before, values);
-  }
+  const std::array<Buffer<float>*, 2> turns = {&values, &other};  // T[j], by whether j is odd
+  in_waves(context_, blocks_, series.size() - 1,
+           [&](std::size_t j, std::size_t begin, std::size_t end) {
+             const Buffer<float>& now = *turns[(j - 1) % 2];
+             Buffer<float>& next = *turns[j % 2];
+             for (std::size_t fan = begin; fan < end; ++fan) {
+               const float step = shares_[fan] * neighbors.sum(fan, now) + kept_[fan] * now[fan];
+               next[fan] = j == 1 ? step : 2 * step - next[fan];
+               sum[fan] = (j == 1 ? series[0] * now[fan] : sum[fan]) + series[j] * next[fan];
+             }
+           });
   return sum;
+}
+
+// The adjoint: shares_ times a sum over neighbours becomes the sum of theirs times their values.
+Buffer<float> VolumeKeeper::spread(Buffer<float> values, std::span<const float> series) const {
+  for_each(context_, values.size(), [&](std::size_t fan) { values[fan] *= shares_[fan]; });
+  Buffer<float> result = averaged(std::move(values), series);
+  for_each(context_, result.size(), [&](std::size_t fan) { result[fan] /= shares_[fan]; });
+  return result;
 }
 
 // Along the normals, which are found too.
@@ -123,7 +127,7 @@ Buffer<float> VolumeKeeper::offsets(const WallShape& shape, Buffer<Lanes>& norma
   Buffer<float> areas = all_fans();
   for_each(context_, fans.size(), [&](std::size_t fan) {
     const std::size_t v = fans.vertex(fan);
-    const FanSums sums(shape, v, fans.spokes(fan));
+    const FanSums sums(shape, fan);
     // A vertex has a part of the volume that each of its triangles has swept since the start in the
     // direction of its normal: its way times a third of the area vector, in the mean over the way.
     // The parts of the three corners add up to all of it.
@@ -136,7 +140,7 @@ Buffer<float> VolumeKeeper::offsets(const WallShape& shape, Buffer<Lanes>& norma
     const float room = std::max(grown * room_[fan], kLeastRoom * areas[fan]);
     offsets[fan] = room > 0 ? missing / room : 0;
   });
-  offsets = diffused(std::move(offsets), series_, Way::kAverage);
+  offsets = averaged(std::move(offsets), series_);
   for_each(context_, fans.size(), [&](std::size_t fan) {
     const float size = length(normals[fan]);
     if (size <= 0 || areas[fan] <= 0) {

@@ -26,12 +26,11 @@ class VolumeKeeper {
   void restore(WallShape& shape) const;
 
  private:
-  enum class Way { kSpread, kAverage };
-
   Buffer<float> all_fans() const;  // of indeterminate values
   void find_areas();
   bool may_move(std::size_t vertex) const;
-  Buffer<float> diffused(Buffer<float> values, std::span<const float> series, Way way) const;
+  Buffer<float> averaged(Buffer<float> values, std::span<const float> series) const;
+  Buffer<float> spread(Buffer<float> values, std::span<const float> series) const;
   Buffer<float> offsets(const WallShape& shape, Buffer<Lanes>& normals) const;
   Lanes way_of_curve(const WallShape& shape, std::size_t vertex, const Buffer<float>& offsets,
                      const Buffer<Lanes>& normals) const;
@@ -41,12 +40,13 @@ class VolumeKeeper {
   const std::vector<float>& series_;
   const Context& context_;
   bool holds_curves_ = false;
-  Buffer<float> kept_;     // by fan: of itself in the mean
-  Buffer<float> shares_;   // by fan: of a neighbour in the mean
-  Buffer<float> missing_;  // by fan, at the start, a little spread
-  Buffer<float> areas_;    // by fan, at the start
-  Buffer<Lanes> normals_;  // the same; the length is twice the area
-  Buffer<float> room_;     // those that may take volume, spread
+  std::vector<std::size_t> blocks_;  // of fans, for in_waves
+  Buffer<float> kept_;               // by fan: of itself in the mean
+  Buffer<float> shares_;             // by fan: of a neighbour in the mean
+  Buffer<float> missing_;            // by fan, at the start, a little spread
+  Buffer<float> areas_;              // by fan, at the start
+  Buffer<Lanes> normals_;            // the same; the length is twice the area
+  Buffer<float> room_;               // those that may take volume, spread
 };
 
 }  // namespace isomesh::mesh

@@ -11,8 +11,7 @@ WallShape::WallShape(const SeparatingSurface& surface, const Dims& dims,
                      const LatticeToSpace& to_space, bool closed, const Context& context)
     : closed_(closed) {
   place(surface, dims, to_space, context);
-  fans_ = WallFans(
-      surface, [&](const Triangle& triangle) { return is_cap(triangle); }, context);
+  fans_ = WallFans(surface, closed_ ? flags_.span() : std::span<std::uint8_t>(), context);
   find_neighbors(context);
 }
 
@@ -29,6 +28,13 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   if (to_space.determinant() < 0) spacing_[0] = -spacing_[0];
 
   const Mesh& mesh = surface.mesh;
+  blocks_ = {0};
+  for (const std::uint64_t first : mesh.layer_vertices) {
+    constexpr std::size_t kBlock = 2048;  // what some of them take stays in a cache of a mebibyte
+    if (first >= blocks_.back() + kBlock) blocks_.push_back(first);
+  }
+  if (blocks_.size() > 1) blocks_.pop_back();  // the last takes what is left
+  blocks_.push_back(mesh.positions.size());
   const std::array<std::uint32_t, 3> samples = {dims.x, dims.y, dims.z};
   start_.resize_for_overwrite(mesh.positions.size());
   flags_.resize_for_overwrite(mesh.positions.size());
@@ -59,18 +65,13 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   });
 }
 
-bool WallShape::is_cap(const Triangle& triangle) const {
-  const auto& [a, b, c] = triangle;
-  return closed_ && (flags_[a] & flags_[b] & flags_[c] & kAxes) != 0;
-}
-
 // Those with which other than two triangles join a vertex, of walls or of caps.
 void WallShape::list_along_curves(std::size_t v, std::vector<std::uint32_t>& found) const {
   std::vector<std::pair<std::uint32_t, bool>> ends;  // of triangles, and whether those are caps
-  visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
+  visit_triangles(v, [&](std::size_t fan, std::uint32_t a, std::uint32_t b) {
     const bool is_cap = fans_.wall(fan).is_cap;
-    ends.emplace_back(spoke.next, is_cap);
-    ends.emplace_back(spoke.previous, is_cap);
+    ends.emplace_back(a, is_cap);
+    ends.emplace_back(b, is_cap);
   });
   std::ranges::sort(ends);
   for (auto begin = ends.begin(), end = begin; begin != ends.end(); begin = end) {
@@ -81,21 +82,17 @@ void WallShape::list_along_curves(std::size_t v, std::vector<std::uint32_t>& fou
 }
 
 void WallShape::find_neighbors(const Context& context) {
-  // A fan that is open has one neighbour more than triangles.
-  const auto may_be_on_curve = [&](std::size_t v) {
-    const std::size_t first = fans_.begin(v);
-    const std::size_t count = fans_.begin(v + 1) - first;
-    return count > 1 ||
-           (count == 1 && fans_.neighbors().degree(first) != fans_.spokes(first).size());
+  const auto is_within_one_wall = [&](std::size_t v) {
+    return fans_.begin(v + 1) - fans_.begin(v) == 1 && fans_.is_closed(fans_.begin(v));
   };
-  neighbors_ = Rings(vertices(), context, [&](std::size_t v, std::vector<std::uint32_t>& list) {
-    if (may_be_on_curve(v)) list_along_curves(v, list);
+  neighbors_ = NeighborLists(vertices(), context, [&](std::size_t v, auto& list) {
+    if (!is_within_one_wall(v)) list_along_curves(v, list);
     if (!list.empty()) {
       flags_[v] |= kCurve;
       return;
     }
-    // Each neighbour of another is the next corner of one triangle.
-    visit_spokes(v, [&](std::size_t /*fan*/, const Spoke& spoke) { list.push_back(spoke.next); });
+    // Each neighbour of another is the first of these in one triangle.
+    visit_triangles(v, [&](std::size_t, std::uint32_t a, std::uint32_t) { list.push_back(a); });
   });
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -23,12 +24,11 @@ inline float dot(Lanes a, Lanes b) {
   return product[0] + product[1] + product[2];
 }
 
-inline Lanes cross(Lanes a, Lanes b) {
-  const auto rotated = [](Lanes lanes) {
-    return __builtin_shufflevector(lanes, lanes, 1, 2, 0, 3);
-  };
-  return rotated(a * rotated(b) - rotated(a) * b);
-}
+inline Lanes rotated(Lanes lanes) { return __builtin_shufflevector(lanes, lanes, 1, 2, 0, 3); }
+
+// The cross product before its lanes are rotated, which a sum of many needs only once.
+inline Lanes twisted_cross(Lanes a, Lanes b) { return a * rotated(b) - rotated(a) * b; }
+inline Lanes cross(Lanes a, Lanes b) { return rotated(twisted_cross(a, b)); }
 
 inline float length(Lanes a) { return std::sqrt(dot(a, a)); }
 
@@ -42,6 +42,9 @@ class WallShape {
 
   std::size_t vertices() const { return start_.size(); }
   const WallFans& fans() const { return fans_; }
+
+  // Runs of vertices of whole layers, for in_waves: where they begin, and where the last ends.
+  std::span<const std::size_t> blocks() const { return blocks_; }
 
   // The positions of the vertices at the start, and now.
   const Buffer<Lanes>& start() const { return start_; }
@@ -63,6 +66,7 @@ class WallShape {
 
   // The way without what would lead out of that.
   Lanes kept(std::size_t v, Lanes way) const {
+    if (!is_held(v)) return way;
     for (int axis = 0; axis < 3; ++axis) {
       if ((flags_[v] >> axis & 1) != 0) way[axis] = 0;
     }
@@ -70,13 +74,14 @@ class WallShape {
   }
 
   // The neighbours of a vertex on a curve are those along it.
-  const Rings& neighbors() const { return neighbors_; }
+  const NeighborLists& neighbors() const { return neighbors_; }
 
-  // Calls visit(fan, spoke) for all triangles at a vertex.
+  // Calls visit(fan, a, b) for all triangles at a vertex and their other corners.
   template <class Visit>
-  void visit_spokes(std::size_t v, Visit visit) const {
+  void visit_triangles(std::size_t v, Visit visit) const {
     for (std::size_t fan = fans_.begin(v); fan < fans_.begin(v + 1); ++fan) {
-      for (const Spoke& spoke : fans_.spokes(fan)) visit(fan, spoke);
+      fans_.visit_triangles(fan, std::identity(),
+                            [&](std::uint32_t a, std::uint32_t b) { visit(fan, a, b); });
     }
   }
 
@@ -86,9 +91,14 @@ class WallShape {
     return neighbors_.sum(v, values) / static_cast<float>(neighbors_.degree(v));
   }
 
-  // The normal of a triangle; its length is twice the area.
-  Lanes normal(std::size_t v, const Spoke& spoke) const {
-    return cross(at[spoke.next] - at[v], at[spoke.previous] - at[v]);
+  // The sum of the normals of a fan's triangles, whose lengths are twice their areas.
+  Lanes normal(std::size_t fan) const {
+    const Lanes own = at[fans_.vertex(fan)];
+    Lanes sum = {};
+    fans_.visit_triangles(
+        fan, [&](std::uint32_t v) { return at[v] - own; },
+        [&](Lanes a, Lanes b) { sum += twisted_cross(a, b); });
+    return rotated(sum);
   }
 
  private:
@@ -98,7 +108,6 @@ class WallShape {
   void place(const SeparatingSurface& surface, const Dims& dims, const LatticeToSpace& to_space,
              const Context& context);
   void find_neighbors(const Context& context);
-  bool is_cap(const Triangle& triangle) const;
   void list_along_curves(std::size_t v, std::vector<std::uint32_t>& found) const;
 
   const bool closed_;
@@ -107,10 +116,11 @@ class WallShape {
   float smallest_spacing_ = 0;
   Lanes low_ = {};
   Lanes high_ = {};
+  std::vector<std::size_t> blocks_;
   Buffer<Lanes> start_;
   Buffer<std::uint8_t> flags_;
   WallFans fans_;
-  Rings neighbors_;
+  NeighborLists neighbors_;
 };
 
 }  // namespace isomesh::mesh

@@ -443,9 +443,9 @@ TEST(Stairs, DependOnlyOnWhatIsNear) {
   EXPECT_GT(same, 1000U);
 }
 
-TEST(Rings, HaveAllNeighboursInTheirOrder) {
+TEST(NeighborLists, HaveAllNeighboursInTheirOrder) {
   constexpr std::size_t kCount = 40'000;  // several chunks
-  const Rings rings(kCount, {}, [](std::size_t i, std::vector<std::uint32_t>& list) {
+  const NeighborLists rings(kCount, {}, [](std::size_t i, std::vector<std::uint32_t>& list) {
     for (std::size_t n = 0; n < i % 23; ++n) list.push_back((i * 7 + n) % kCount);
   });
   Buffer<std::uint64_t> numbers;

@@ -15,14 +15,14 @@ namespace isomesh::mesh {
 // The neighbours of a number of things. Each has eight places, filled up with the number of all
 // things, so most loops have no end that a processor would have to guess. Safe to read from several
 // threads.
-class Rings {
+class NeighborLists {
  public:
-  Rings() = default;
+  NeighborLists() = default;
 
   // neighbors(i, list) appends those of thing i to an empty list; it is called from several
   // threads. `count` is less than 2^31. Throws Error kCancelled.
   template <class Neighbors>
-  Rings(std::size_t count, const Context& context, const Neighbors& neighbors)
+  NeighborLists(std::size_t count, const Context& context, const Neighbors& neighbors)
       : count_(static_cast<std::uint32_t>(count)), more_(chunks_of(count)) {
     degrees_.resize_for_overwrite(count);
     places_.resize_for_overwrite(count * kPlaces);
