@@ -17,6 +17,8 @@ HERE = Path(__file__).resolve().parent
 PACKAGE = next(each.parent for each in sorted((HERE / "src").glob("*/__init__.py")))
 VERSION = re.search('__version__ = "(.*)"', (PACKAGE / "version.py").read_text())[1]
 NAME = f"{PACKAGE.name}-{VERSION}"
+# Lists of what a package is made of, if docker/release has put them beside it, with their places in the wheel (PEP 770 and 639).
+LISTS = {"sbom.cdx.json": "sboms", "third-party-licenses.gz": "licenses"}
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
 
@@ -43,6 +45,9 @@ def _wheel(folder, files):
     pure = str(tag.endswith("-any")).lower()
     about = f"Wheel-Version: 1.0\nGenerator: isomesh\nRoot-Is-Purelib: {pure}\nTag: {tag}\n"
     files = {**files, f"{info}/METADATA": _metadata(), f"{info}/WHEEL": about.encode()}
+    for name, place in LISTS.items():
+        if (HERE / name).exists():
+            files[f"{info}/{place}/{name}"] = (HERE / name).read_bytes()
     record = ""
     with zipfile.ZipFile(Path(folder, f"{NAME}-{tag}.whl"), "w", zipfile.ZIP_DEFLATED) as wheel:
         for name, data in files.items():

@@ -228,7 +228,7 @@ export function chordOfBall(radius: number, distance: number, part: number): num
 }
 
 // A cube of samples of those values, as NRRD.
-function cubeNrrd(size: number, value: (x: number, y: number, z: number) => number, fields: string[] = []): Buffer {
+export function cubeNrrd(size: number, value: (x: number, y: number, z: number) => number, fields: string[] = []): Buffer {
   const samples = Buffer.alloc(size ** 3);
   for (let at = 0; at < samples.length; at += 1) {
     samples[at] = value(at % size, Math.floor(at / size) % size, Math.floor(at / size ** 2));

@@ -1,7 +1,7 @@
 // What comes in: several files, refused ones, and those of people with a token.
 import { readFileSync } from 'node:fs';
 import { describe, expect } from 'vitest';
-import { ballNrrd, brain, setup, drop, openPage, surfaceLoaded, withTokens } from './support';
+import { ballNrrd, brain, cubeNrrd, setup, drop, openPage, surfaceLoaded, withTokens } from './support';
 
 const { it } = setup();
 
@@ -23,6 +23,21 @@ describe('several files', () => {
     ]);
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
     await expect.poll(() => page.locator('.facts').innerText()).toMatch(/MetaImage.*20 \u00d7 20 \u00d7 20.*1 \u00d7 1 \u00d7 2 mm/);
+  });
+
+  it('that are masks become one volume with a name for each, if a person says so', async ({ daemon, page }) => {
+    await page.goto(daemon.url);
+    const mask = (from: number): Buffer => cubeNrrd(12, (x, y, z) => Number(x >= from && x < from + 4 && y > 2 && y < 8 && z > 2 && z < 8));
+    await drop(page, [
+      { name: 'liver.nrrd', bytes: mask(1) },
+      { name: 'spleen.nrrd', bytes: mask(7) },
+    ]);
+    await expect.poll(() => page.locator('.drop').innerText()).toContain('2 of 2 volumes in the upload were stored');
+    await page.getByRole('button', { name: 'One surface each, together' }).click();
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    const id = /[0-9a-f]{64}/.exec(page.url())?.[0] ?? '';
+    const { labels } = await daemon.json<{ labels: { name: string; voxels: number }[] }>(`/v1/volumes/${id}/labels?background=0`);
+    expect(labels.map(({ name, voxels }) => [name, voxels])).toEqual([['liver', 100], ['spleen', 100]]);
   });
 
   it('of more than one series let a person choose', async ({ daemon, page }) => {
