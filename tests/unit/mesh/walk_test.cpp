@@ -1,6 +1,7 @@
 #include "server/mesh/walk/walk.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <memory>
 #include <set>
@@ -370,6 +371,49 @@ TEST(Walk, SaysThatTheSpoolIsFull) {
   test::MemorySpool spool(1000);
   const Case one = {volume, {.iso = 60, .regularize = true}, {}, &spool};
   EXPECT_EQ(test::code_thrown_by([&] { windows_of(one); }), ErrorCode::kOutOfSpace);
+}
+
+// Fails when so many arrays have been read from it.
+class FailingSpool : public test::MemorySpool {
+ public:
+  void read(std::uint64_t at, std::span<std::byte> bytes) const override {
+    if (++reads_ > 40) throw Error(ErrorCode::kInternal, "what was set aside is not there");
+    test::MemorySpool::read(at, bytes);
+  }
+
+ private:
+  mutable std::atomic<int> reads_ = 0;
+};
+
+TEST(Walk, EndsWithWhatTheSpoolThrows) {
+  const Bytes volume = specks();
+  for (const int threads : {1, 2, 8}) {
+    const test::ThreadCount several(threads);
+    FailingSpool spool;
+    const Case one = {volume, {.iso = 60, .regularize = true}, {.steps = means(5, {1})}, &spool};
+    SurfaceWindows windows = windows_of(one);
+    Collector collector(windows.count());
+    EXPECT_EQ(test::code_thrown_by([&] {
+                walk(windows, {one.smooth, 1, true}, {}, collector);
+              }),
+              ErrorCode::kInternal);
+  }
+}
+
+TEST(ExtractMemory, IsNotTakenForMoreVerticesThanIndicesCanName) {
+  const auto volume = test::checkerboard<std::uint8_t>(0, 9, {4, 4, 4});
+  const ExtractOptions options = {5, Scheme::kSix, Interpolation::kLinear};
+  SurfaceCount count = count_surface(volume.lattice(), options, {});
+  count.layer_vertices.back() = std::uint64_t{1} << 33;
+  Mesh mesh;
+  try {
+    make_room(count, volume.lattice().to_space, options.close, mesh);
+    FAIL() << "it was not refused";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
+  }
+  EXPECT_EQ(mesh.positions.capacity_bytes(), 0U);
+  EXPECT_EQ(mesh.triangles.capacity_bytes(), 0U);
 }
 
 // Joined crossings that a slab has no business with may be missing or wrong.
