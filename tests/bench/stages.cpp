@@ -10,6 +10,7 @@
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/stage_times.h"
 #include "server/mesh/extract/extract.h"
+#include "server/mesh/extract/windows.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/smooth/smooth.h"
@@ -62,7 +63,7 @@ void Stages::extract() {
   visit_samples(samples_, [&](const auto* data) {
     const auto lattice = lattice_of(samples_, data);
     const mesh::ExtractOptions options = options_of(surface_);
-    mesh::extract_surface(lattice, options, mesh::count_surface(lattice, options, {}), {}, mesh_);
+    mesh::SurfaceWindows(lattice, options, {}).write_whole({}, mesh_);
   });
 }
 

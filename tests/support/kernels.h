@@ -7,6 +7,7 @@
 
 #include "proto/types.h"
 #include "server/mesh/extract/extract.h"
+#include "server/mesh/extract/windows.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/smooth/smooth.h"
@@ -21,8 +22,7 @@ template <class T>
 void extract_into(mesh::Mesh& mesh, const SampleVolume<T>& volume,
                   const mesh::ExtractOptions& options, const mesh::Context& context = {}) {
   const mesh::Lattice<T> lattice = volume.lattice();
-  const mesh::SurfaceCount count = mesh::count_surface(lattice, options, context);
-  mesh::extract_surface(lattice, options, count, context, mesh);
+  mesh::SurfaceWindows(lattice, options, context).write_whole(context, mesh);
 }
 
 template <class T>

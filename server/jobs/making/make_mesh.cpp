@@ -23,20 +23,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-void extract(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
-             mesh::Mesh& mesh) {
-  constexpr double kCounting = 0.2;  // of the whole
-  const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
-  const mesh::Context context = progress.context();
-  with_sample(samples.type, [&](auto sample) {
-    const auto lattice = lattice_of<decltype(sample)>(samples);
-    const mesh::SurfaceCount count =
-        mesh::count_surface(lattice, options, context.part(0, kCounting));
-    check_memory(size_of(count), lattice.dims.samples(), request);
-    extract_surface(lattice, options, count, context.part(kCounting, 1), mesh);
-  });
-}
-
 bool shows_topology(const MeshParameters& parameters) {
   return std::ranges::any_of(parameters.formats, [&](MeshFormat format) {
     return codec::describe(format).shows_topology(parameters);
@@ -140,13 +126,8 @@ void Workspace::trim(std::size_t budget_bytes) {
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
-  if (can_be_walked(parameters, request.certify)) {
-    auto walked = walk_stage(samples, request, sinks, progress, mesh);
-    if (walked) return *std::move(walked);
-  } else {
-    progress.enter(Stage::kExtract);
-    extract(samples, request, progress, mesh);
-  }
+  auto walked = walk_stage(samples, request, sinks, progress, mesh);
+  if (walked) return *std::move(walked);
   MeshSummary summary;
   summary.iso = request.iso;
   leave_out_parts(parameters, progress, mesh, summary.dropped);

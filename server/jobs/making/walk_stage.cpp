@@ -90,7 +90,8 @@ std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequ
   return with_sample(samples.type, [&](auto sample) -> std::optional<MeshSummary> {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const std::uint64_t count = lattice.dims.samples();
-    mesh::Spool* const spool = sets_aside(count) ? request.spool : nullptr;
+    const bool is_large = can_be_walked(parameters, request.certify) && sets_aside(count);
+    mesh::Spool* const spool = is_large ? request.spool : nullptr;
     Files files;
     for (bool is_first = true; is_first || !files.empty(); is_first = false) {
       progress.enter(Stage::kExtract);

@@ -12,9 +12,9 @@
 
 namespace isomesh::jobs {
 
-// Makes the mesh of a job that can_be_walked(). Files begin when the surface has been counted. The
-// summary and the bytes are those of a mesh that is made as a whole. Only extracts the surface,
-// into `mesh`, and returns nothing if it is not worth a walk (is_walked). Throws as make_mesh.
+// Makes the mesh, if it is worth a walk (is_walked). Files begin when the surface has been counted.
+// The summary and the bytes are those of a mesh that is made as a whole. Otherwise only extracts
+// the surface, into `mesh`, and returns nothing. Throws as make_mesh.
 std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequest& request,
                                       std::span<const codec::Sink> sinks, Progress& progress,
                                       mesh::Mesh& mesh);

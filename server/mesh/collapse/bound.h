@@ -44,7 +44,7 @@ struct BoundedMesh {
   double bound_at(std::span<const Vec3> places) const;
 };
 
-// Simplifies `mesh` in place, which extract_surface made of the lattice with these options, and
+// Simplifies `mesh` in place, which SurfaceWindows made of the lattice with these options, and
 // which may have lost components (Mesh::kept) and have been smoothed since, by less than the error.
 // Distances are those from the surface without these components. Its boundary stays on the faces
 // of the volume and keeps its vertices; the caps of a closed one stay in the faces. The mesh keeps

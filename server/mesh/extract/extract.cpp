@@ -102,38 +102,6 @@ SurfaceSize size_of(const SurfaceCount& count) {
 }
 
 template <class T>
-SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
-                           const Context& context) {
-  SurfaceCount count = empty_count(marched_dims(lattice.dims, options.close).z);
-  const auto smallest = smallest_inside<T>(options.iso);
-  if (!lattice.dims.has_cells() || !smallest) {
-    context.throw_if_stopped();
-    return count;
-  }
-
-  const Extraction extraction(lattice, options, *smallest);
-  if (options.regularize) count.clusters.resize(extraction.dims.z);
-  count_pass(extraction, context, count);
-  prefix_pass(count);
-  return count;
-}
-
-template <class T>
-void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
-                     const SurfaceCount& count, const Context& context, Mesh& mesh) {
-  make_room(count, lattice.to_space, options.close, mesh);
-  const auto smallest = smallest_inside<T>(options.iso);
-  if (!lattice.dims.has_cells() || !smallest || count.vertices() == 0) {
-    return context.throw_if_stopped();
-  }
-
-  Extraction extraction(lattice, options, *smallest);
-  if (options.regularize) extraction.keep(count.clusters);
-  mesh.reach = reach_of(count.crossed, lattice.to_space);
-  write_pass(extraction, places_of(options.scheme), context, mesh, mesh);
-}
-
-template <class T>
 SurfaceWindows::SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& options,
                                const Context& context, Spool* spool)
     : close_(options.close),
@@ -154,6 +122,12 @@ SurfaceWindows::SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& 
 }
 
 SurfaceWindows::~SurfaceWindows() = default;
+
+template <class T>
+SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                           const Context& context) {
+  return SurfaceWindows(lattice, options, context).take_count();
+}
 
 void SurfaceWindows::write(std::uint32_t begin, std::uint32_t end, Mesh& mesh) {
   mesh.origin = to_space_.origin;
@@ -176,7 +150,8 @@ void SurfaceWindows::write(std::uint32_t begin, std::uint32_t end, Mesh& mesh) {
 
 void SurfaceWindows::write_whole(const Context& context, Mesh& mesh) {
   make_room(count_, to_space_, close_, mesh);
-  if (!extraction_) return;
+  context.throw_if_stopped();
+  if (count_.vertices() == 0) return;
   mesh.reach = reach();
   joined_->take_back(0, layers());
   write_pass(*extraction_, places_of(extraction_->scheme), context, mesh, mesh);
@@ -184,12 +159,10 @@ void SurfaceWindows::write_whole(const Context& context, Mesh& mesh) {
 
 void SurfaceWindows::forget(std::uint32_t begin, std::uint32_t end) { joined_->forget(begin, end); }
 
-#define ISOMESH_INSTANTIATE(T, name, kType)                                                      \
-  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&); \
-  template void extract_surface(const Lattice<T>&, const ExtractOptions&, const SurfaceCount&,   \
-                                const Context&, Mesh&);                                          \
-  template SurfaceWindows::SurfaceWindows(const Lattice<T>&, const ExtractOptions&,              \
-                                          const Context&, Spool*);
+#define ISOMESH_INSTANTIATE(T, name, kType)                                         \
+  template SurfaceWindows::SurfaceWindows(const Lattice<T>&, const ExtractOptions&, \
+                                          const Context&, Spool*);                  \
+  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

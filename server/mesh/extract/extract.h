@@ -19,9 +19,9 @@
 // the volume stay, and so does every boundary.
 //
 // Three passes: count_surface (1) counts the vertices and triangles of each layer and (2) sums the
-// counts up, so that every layer knows its place; extract_surface (3) writes every vertex and
-// triangle there. Nothing is searched, hashed or merged: a vertex is named by the sample that owns
-// its edge and the edge's direction, and its index is a running count.
+// counts up, so that every layer knows its place; SurfaceWindows (windows.h) writes (3) every
+// vertex and triangle there. Nothing is searched, hashed or merged: a vertex is named by the sample
+// that owns its edge and the edge's direction, and its index is a running count.
 //
 // A surface that is to be closed is marched on around the volume, as if one more layer of samples
 // beyond each face were outside; those samples are nowhere in memory. Its caps lie on the border of
@@ -68,13 +68,5 @@ SurfaceSize size_of(const SurfaceCount& count);
 template <class T>
 SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
                            const Context& context);
-
-// Extracts the surface into `mesh`, whose memory is reused. `count` must come from count_surface
-// with the same lattice and options. The result does not depend on the number of threads.
-// Thread safe for different meshes. Throws Error kTooLarge when the mesh has more vertices than
-// 32-bit indices can name, before memory is taken, and kCancelled.
-template <class T>
-void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
-                     const SurfaceCount& count, const Context& context, Mesh& mesh);
 
 }  // namespace isomesh::mesh

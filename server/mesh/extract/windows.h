@@ -1,10 +1,11 @@
-// Extraction of a surface in windows, runs of its layers, so that it need not be in memory as a
-// whole.
+// Extraction of a surface: in windows, runs of its layers, so that it need not be in memory as a
+// whole, or into one mesh.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "server/mesh/context.h"
 #include "server/mesh/extract/extract.h"
@@ -29,6 +30,7 @@ class SurfaceWindows {
   ~SurfaceWindows();
 
   const SurfaceCount& count() const { return count_; }
+  SurfaceCount take_count() && { return std::move(count_); }
   std::uint32_t layers() const {
     return static_cast<std::uint32_t>(count_.layer_vertices.size() - 1);
   }
@@ -41,7 +43,9 @@ class SurfaceWindows {
   // name; those are left indeterminate. Vertices have the mesh's own numbers. Thread safe for
   // different meshes. Throws as the spool.
   void write(std::uint32_t begin, std::uint32_t end, Mesh& mesh);
-  // Writes all of it, as extract_surface does. Once, and not after `forget`.
+  // Writes all of it into `mesh`, whose memory is reused. The result does not depend on the number
+  // of threads. Not after `forget`. Throws Error kTooLarge when there are more vertices than 32-bit
+  // indices can name, before memory is taken, and kCancelled; and as the spool.
   void write_whole(const Context& context, Mesh& mesh);
   // Frees what layers need that are not written again. Not while others near them are written.
   void forget(std::uint32_t begin, std::uint32_t end);

@@ -107,7 +107,7 @@ void measure_again(std::ptrdiff_t layer, bool SmoothedLayer::*was_moved,
   const LayerView view = layers.view(layer);
   for (std::size_t v = 0; v < view.vertices(); ++v)
     result.after.add_vertex(load(view.positions[v]));
-  layers.add_triangles(layer, result.after);
+  layers.add_triangles(layer, &SmoothedLayer::after);
 }
 
 void nudge_flat(std::ptrdiff_t layer, const SmoothedLayers& layers) {
@@ -130,9 +130,6 @@ void FlatTriangles::go_on(std::ptrdiff_t moved) {
   const auto without = [&](std::ptrdiff_t waiting) {
     return moved == count ? count : std::max<std::ptrdiff_t>(0, moved - waiting);
   };
-  for (; measured_ < without(2); ++measured_) {
-    measure_again(measured_, &SmoothedLayer::was_put_back, layers_);
-  }
   for (; nudged_ < without(3); ++nudged_) nudge_flat(nudged_, layers_);
   for (; ended_ < without(4); ++ended_) {
     measure_again(ended_, &SmoothedLayer::was_nudged, layers_);

@@ -27,7 +27,7 @@ void measure_again(std::ptrdiff_t layer, bool SmoothedLayer::*was_moved,
 // up to the second next have been put back, and those up to the next measured again.
 void nudge_flat(std::ptrdiff_t layer, const SmoothedLayers& layers);
 
-// Does all that as the layers come, after all steps of one slab.
+// Nudges as the layers come, after all their steps, and measures again.
 class FlatTriangles {
  public:
   explicit FlatTriangles(SmoothedLayers layers) : layers_(std::move(layers)) {}
@@ -39,7 +39,6 @@ class FlatTriangles {
 
  private:
   const SmoothedLayers layers_;
-  std::ptrdiff_t measured_ = 0;
   std::ptrdiff_t nudged_ = 0;
   std::ptrdiff_t ended_ = 0;
 };

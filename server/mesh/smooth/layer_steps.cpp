@@ -146,48 +146,47 @@ Float4 pulled_back(const Vec3& origin, Float4 position, double limit) {
   return position;
 }
 
+// The layers that are moved by all but so many steps, for a run to be right.
+LayerRange around_run(const LayerRange& run, std::size_t steps, std::ptrdiff_t layers) {
+  const auto begin = run.begin - static_cast<std::ptrdiff_t>(kBelowRun + steps);
+  const auto end = run.end + static_cast<std::ptrdiff_t>(kAboveRun + steps);
+  return {std::max<std::ptrdiff_t>(0, begin), std::min(layers, end)};
+}
+
 }  // namespace
 
 class LayerSteps::Sweep {
  public:
-  Sweep(const Round& round, const LayerRange& slab, SmoothedLayers layers)
+  Sweep(const Round& round, const LayerRange& run, SmoothedLayers layers)
       : round_(round),
-        slab_(slab),
+        run_(run),
         layers_(std::move(layers)),
         steps_(round.steps()),
-        width_(round.largest_layer),
-        front_(covered(0).begin) {
+        width_(round.largest_layer) {
     for (std::size_t step = 0; step < std::max<std::size_t>(1, steps_); ++step) {
       rings_.emplace_back().resize_for_overwrite(kRingLayers * width_ + 1);
       rings_.back()[kRingLayers * width_] = Float4{};  // for places of no neighbour
     }
     moved_.resize_for_overwrite(width_);
-    if (round_.is_last) kept_.resize_for_overwrite(kLayersOfTriangles * width_);
+    if (round_.is_last()) kept_.resize_for_overwrite(kLayersOfTriangles * width_);
     links_.resize((steps_ + 1) * width_, Neighbors(place_of_zero()));
     fans_.resize(kLayersOfFans * width_);
     more_.resize(steps_ + 1);
     on_line_.resize(steps_ + 1);
   }
 
-  // The layers that a step moves. Those of step 0 are the ones that the first step reads.
-  LayerRange covered(std::size_t step) const {
-    const auto halo = static_cast<std::ptrdiff_t>(steps_ - step);
-    return {std::max<std::ptrdiff_t>(0, slab_.begin - halo),
-            std::min(layers_.count(), slab_.end + halo)};
-  }
-
   void go_on(std::ptrdiff_t available) {
-    const LayerRange all = covered(0);
-    if (available <= all.begin) return;
+    if (available <= 0) return;
     if (!has_begun_) {
-      read(all.begin);
-      begin_links(all.begin);
+      read(0);
+      begin_links(0);
       has_begun_ = true;
     }
     const auto last_step = static_cast<std::ptrdiff_t>(steps_);
-    const std::ptrdiff_t end = available >= all.end
-                                   ? slab_.end + std::max<std::ptrdiff_t>(0, last_step - 1)
-                                   : available - 1;
+    const std::ptrdiff_t end =
+        available >= layers_.count()
+            ? covered(steps_).end + std::max<std::ptrdiff_t>(0, last_step - 1)
+            : available - 1;
     for (; front_ < end; ++front_) {
       read(front_ + 1);
       link(front_);
@@ -200,11 +199,16 @@ class LayerSteps::Sweep {
   std::ptrdiff_t moved() const {
     const std::ptrdiff_t behind =
         std::max<std::ptrdiff_t>(0, static_cast<std::ptrdiff_t>(steps_) - 1);
-    return std::clamp(front_ - behind, slab_.begin, slab_.end);
+    return std::clamp<std::ptrdiff_t>(front_ - behind, 0, layers_.count());
   }
 
  private:
   LayerView view(std::ptrdiff_t layer) const { return layers_.view(layer); }
+
+  // The layers that a step moves. Those of step 0 are the ones that the first step reads.
+  LayerRange covered(std::size_t step) const {
+    return around_run(run_, steps_ - step, layers_.count());
+  }
 
   static std::size_t turn(std::ptrdiff_t layer, std::size_t period) {
     return static_cast<std::size_t>(layer) % period;
@@ -237,24 +241,17 @@ class LayerSteps::Sweep {
   }
 
   void read(std::ptrdiff_t layer) {
-    if (!covered(0).contains(layer)) return;
+    if (layer >= layers_.count()) return;
     const LayerView from = view(layer);
     Float4* to = positions(0, layer);
     const std::size_t count = from.vertices();
     for (std::size_t v = 0; v < count; ++v) to[v] = load(from.positions[v]);
-    if (!round_.is_first || !slab_.contains(layer)) return;
+    if (!round_.is_first()) return;
     LayerExtent& before = layers_.result(layer).before;
     for (std::size_t v = 0; v < count; ++v) before.add_vertex(to[v]);
-    measure(layer, &SmoothedLayer::before);
-  }
-
-  // Measures the triangles of the slab that are complete once the layer is.
-  void measure(std::ptrdiff_t layer, LayerExtent SmoothedLayer::*extent) {
-    const auto add = [&](std::ptrdiff_t of) {
-      layers_.add_triangles(of, layers_.result(of).*extent);
-    };
-    if (slab_.contains(layer - 1)) add(layer - 1);
-    if (layer + 1 == layers_.count()) add(layer);
+    if (run_.contains(layer - 1)) layers_.add_triangles(layer - 1, &SmoothedLayer::before);
+    const bool is_last = layer + 1 == layers_.count();
+    if (is_last && run_.contains(layer)) layers_.add_triangles(layer, &SmoothedLayer::before);
   }
 
   void begin_links(std::ptrdiff_t layer) {
@@ -323,7 +320,7 @@ class LayerSteps::Sweep {
       const bool is_fixed = fan[v].is_on_boundary() || own.mesh->is_on_border(own.first() + v);
       link[v].weight = is_fixed ? 0 : fan[v].one_over_count();
     }
-    if (round_.at_curves == AtCurves::kAlong) free_along_lines(layer);
+    if (round_.options.at_curves == AtCurves::kAlong) free_along_lines(layer);
   }
 
   void advance(std::size_t step, std::ptrdiff_t layer) {
@@ -331,14 +328,14 @@ class LayerSteps::Sweep {
     const bool is_last = step == steps_;
     Float4* to = is_last ? moved_.data() : positions(step, layer);
     move(step, layer, to);
-    if (!round_.within.empty()) hold_within(layer, to);
-    if (std::isfinite(round_.max_displacement_mm)) pull_back(layer, to);
+    if (!round_.options.within.empty()) hold_within(layer, to);
+    if (std::isfinite(round_.options.max_displacement_mm)) pull_back(layer, to);
     if (!is_last) return;
     finish(layer);
   }
 
   void move(std::size_t step, std::ptrdiff_t layer, Float4* to) {
-    const float share = round_.shares[step - 1];
+    const auto share = static_cast<float>(round_.options.steps[round_.first + step - 1].weight);
     const Neighbors* link = links(layer);
     const MoreNeighbor* more = more_neighbors(layer).data();
     const Float4* ring = rings_[step - 1].data();
@@ -359,7 +356,7 @@ class LayerSteps::Sweep {
     const std::size_t count = view(layer).vertices();
     for (std::size_t v = 0; v < count; ++v) {
       if (link[v].weight == 0) continue;
-      for (const HalfSpace& half : round_.within) {
+      for (const HalfSpace& half : round_.options.within) {
         const double outside = half.normal[0] * to[v][0] + half.normal[1] * to[v][1] +
                                half.normal[2] * to[v][2] - half.offset;
         if (outside <= 0) continue;
@@ -375,7 +372,7 @@ class LayerSteps::Sweep {
   }
 
   void pull_back(std::ptrdiff_t layer, Float4* to) const {
-    const double limit = round_.max_displacement_mm;
+    const double limit = round_.options.max_displacement_mm;
     const auto surely_within = static_cast<float>(limit * 0.999);
     const LayerView own = view(layer);
     const Vec3* origin = extracted(own);
@@ -393,7 +390,7 @@ class LayerSteps::Sweep {
     const Vec3* origin = extracted(own);  // may be `to`: read before written
     Vec3* to = own.positions;
     LayerDisplacement displacement;
-    SmoothedLayer* result = round_.is_last ? &layers_.result(layer) : nullptr;
+    SmoothedLayer* result = round_.is_last() ? &layers_.result(layer) : nullptr;
     if (result != nullptr) std::copy_n(origin, count, kept(layer));
     for (std::size_t v = 0; v < count; ++v) {
       const Float4 moved = moved_[v];
@@ -406,26 +403,27 @@ class LayerSteps::Sweep {
     }
     if (result == nullptr) return;
     result->displacement = displacement;
-    measure(layer, &SmoothedLayer::after);
-    if (slab_.contains(layer - 1)) restore(layer - 1);
-    if (layer + 1 == layers_.count()) restore(layer);
+    if (layer > covered(steps_).begin) restore(layer - 1);
+    if (layer + 1 < layers_.count()) return;
+    restore(layer);
+    measure_again(layer, &SmoothedLayer::was_put_back, layers_);
   }
 
-  // Undoes the moves that left triangles without area, once all triangles of the layer are known.
+  // Measures the layer's triangles, whose vertices have all been moved, and undoes the moves that
+  // left them without area.
   void restore(std::ptrdiff_t layer) {
+    layers_.add_triangles(layer, &SmoothedLayer::after);
     if (layers_.result(layer).after.has_flat()) list_flat(layer, layers_);
-    const bool is_first = layer == slab_.begin && layer > 0;
-    const bool is_last = layer + 1 == slab_.end && slab_.end < layers_.count();
-    if (is_first || is_last) return;  // another slab's triangles name its vertices, too
     put_back(kept(layer), layer, layers_);
+    if (layer > 0) measure_again(layer - 1, &SmoothedLayer::was_put_back, layers_);
   }
 
   const Round round_;
-  const LayerRange slab_;
+  const LayerRange run_;
   const SmoothedLayers layers_;
   const std::size_t steps_;
-  const std::size_t width_;  // the vertices of the largest layer
-  std::ptrdiff_t front_;     // the layer whose links come next
+  const std::size_t width_;   // the vertices of the largest layer
+  std::ptrdiff_t front_ = 0;  // the layer whose links come next
   bool has_begun_ = false;
   std::vector<Buffer<Float4>> rings_;  // positions before each step
   Buffer<Float4> moved_;               // the positions of one layer after the last step
@@ -436,10 +434,13 @@ class LayerSteps::Sweep {
   std::vector<std::vector<MoreNeighbor>> on_line_;
 };
 
-LayerSteps::LayerSteps(const Round& round, const LayerRange& slab, SmoothedLayers layers)
-    : sweep_(std::make_unique<Sweep>(round, slab, std::move(layers))) {}
+LayerSteps::LayerSteps(const Round& round, const LayerRange& run, SmoothedLayers layers)
+    : sweep_(std::make_unique<Sweep>(round, run, std::move(layers))) {}
 LayerSteps::~LayerSteps() = default;
 
+LayerRange LayerSteps::around(const Round& round, const LayerRange& run, std::ptrdiff_t layers) {
+  return around_run(run, round.steps(), layers);
+}
 void LayerSteps::go_on(std::ptrdiff_t available) { sweep_->go_on(available); }
 std::ptrdiff_t LayerSteps::moved() const { return sweep_->moved(); }
 
@@ -450,12 +451,12 @@ void LayerDisplacement::add(const Vec3& extracted, const Vec3& moved) {
   largest = std::max(largest, length);
 }
 
-void SmoothedLayers::add_triangles(std::ptrdiff_t layer, LayerExtent& extent) const {
+void SmoothedLayers::add_triangles(std::ptrdiff_t layer, LayerExtent SmoothedLayer::*extent) const {
   const LayerView low = view(layer);
   const LayerView high = layer + 1 < count() ? view(layer + 1) : LayerView();
   const std::uint64_t first = low.first();
   const std::uint64_t split = low.end();
-  extent.add_triangles(low.triangles(), low.mesh->origin, [&](std::uint32_t v) {
+  (result(layer).*extent).add_triangles(low.triangles(), low.mesh->origin, [&](std::uint32_t v) {
     return load(v < split ? low.positions[v - first] : high.positions[v - split]);
   });
 }

@@ -67,39 +67,46 @@ struct SmoothedLayers {
     return results[static_cast<std::size_t>(layer)];
   }
   // Adds the layer's triangles, which name vertices of the next layer, too.
-  void add_triangles(std::ptrdiff_t layer, LayerExtent& extent) const;
+  void add_triangles(std::ptrdiff_t layer, LayerExtent SmoothedLayer::*extent) const;
   // The sums of all layers, of so many vertices.
   SmoothingEffect effect(std::uint64_t vertices) const;
 };
 
-// Steps that are made together.
+// Steps that are made together: [first, end) of the options'.
 struct Round {
-  std::span<const float> shares;  // of the way to the mean of the neighbours: one for each step
-  AtCurves at_curves = AtCurves::kAlong;
-  double max_displacement_mm = 0;
-  std::span<const HalfSpace> within;  // free vertices stay within them
-  std::size_t largest_layer = 0;      // at least the vertices of each
-  bool is_first = true;               // measures the surface before
-  bool is_last = true;                // measures it afterwards, and puts vertices back
+  const SmoothOptions& options;
+  std::size_t first = 0;
+  std::size_t end = 0;
+  std::size_t largest_layer = 0;  // at least the vertices of each
 
-  std::size_t steps() const { return shares.size(); }
+  std::size_t steps() const { return end - first; }
+  // The first measures the surface before; the last measures it afterwards, and puts vertices back.
+  bool is_first() const { return first == 0; }
+  bool is_last() const { return end == options.steps.size(); }
 };
 
-// Moves the vertices of a slab's layers by all steps of a round, as the layers come. Reads layers
-// on either side of the slab, one more with each step, and leaves them as they are: `view` gives
-// copies of those that other slabs move meanwhile. In the last round, vertices of triangles without
-// area are put back, except those of layers beside another slab, which are listed. Triangles that
-// name vertices of two slabs are not measured. Thread safe for different slabs.
+// The layers beside a run on which its own depend after the last step: a vertex that is put back
+// changes the triangles of the layer before, and corners of the layer's and of the next one's
+// triangles tell what is put back.
+inline constexpr std::size_t kBelowRun = 1;
+inline constexpr std::size_t kAboveRun = 2;
+
+// Moves the vertices of a run of layers by all steps of a round, as the layers come, and those
+// around the run as far as they matter to it. In the last round, vertices of triangles without area
+// are put back. What a run makes does not depend on where it is cut.
 class LayerSteps {
  public:
-  // What these refer to must outlive it.
-  LayerSteps(const Round& round, const LayerRange& slab, SmoothedLayers layers);
+  // `layers` are those of `around(run)`. What these refer to must outlive it.
+  LayerSteps(const Round& round, const LayerRange& run, SmoothedLayers layers);
   ~LayerSteps();
+
+  // A run of that many layers of the surface, and what it reads on both sides, which it moves too.
+  static LayerRange around(const Round& round, const LayerRange& run, std::ptrdiff_t layers);
 
   // Goes on as far as it can when the layers before `available` may be read.
   void go_on(std::ptrdiff_t available);
   // The layers before this have been moved by all steps; those before the last of them have been
-  // put back.
+  // put back, and those before the last two measured.
   std::ptrdiff_t moved() const;
 
  private:

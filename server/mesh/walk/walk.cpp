@@ -55,21 +55,16 @@ class Walk {
         threads_(static_cast<std::size_t>(thread_count())),
         depth_(depth),
         has_normals_(options.normals),
+        is_smoothed_(!options.smooth.steps.empty()),
         count_((surface.layers() + depth - 1) / depth),
         slots_(std::min(count_, windows_at_once(options, depth))),
         results_(surface.layers()),
         layers_{[this](std::ptrdiff_t layer) { return view(layer); }, results_},
+        steps_({options.smooth, 0, options.smooth.steps.size(),
+                size_of(surface.count()).largest_layer},
+               {0, layers_.count()}, layers_),
         flat_(layers_),
         written_(count_, false) {
-    const SmoothOptions& smooth = options.smooth;
-    for (const Step& step : smooth.steps) shares_.push_back(static_cast<float>(step.weight));
-    const Round round = {.shares = shares_,
-                         .at_curves = smooth.at_curves,
-                         .max_displacement_mm = smooth.max_displacement_mm,
-                         .within = smooth.within,
-                         .largest_layer = size_of(surface.count()).largest_layer,
-                         .is_last = !shares_.empty()};
-    steps_.emplace(round, LayerRange{0, layers_.count()}, layers_);
     make_room();
   }
 
@@ -81,7 +76,7 @@ class Walk {
     });
     const Lock lock(mutex_);
     SmoothingEffect effect = layers_.effect(surface_.count().vertices());
-    if (shares_.empty()) effect.after = effect.before;
+    if (!is_smoothed_) effect.after = effect.before;
     return {effect, seconds_};
   }
 
@@ -260,8 +255,8 @@ class Walk {
   }
 
   void smooth(std::size_t window) {
-    steps_->go_on(end_of(window));
-    flat_.go_on(steps_->moved());
+    steps_.go_on(end_of(window));
+    flat_.go_on(steps_.moved());
     if (has_normals_) shade();
     const std::ptrdiff_t ended = has_normals_ ? shaded_ : flat_.ended();
     for (; settled_ < count_; ++settled_) {
@@ -309,14 +304,14 @@ class Walk {
   const std::size_t threads_;
   const std::uint32_t depth_;
   const bool has_normals_;
+  const bool is_smoothed_;
   const std::size_t count_;  // of windows
   std::vector<Window> slots_;
-  std::vector<float> shares_;
   std::vector<SmoothedLayer> results_;
   const SmoothedLayers layers_;
 
   // Of the thread that smooths.
-  std::optional<LayerSteps> steps_;
+  LayerSteps steps_;
   FlatTriangles flat_;
   std::ptrdiff_t shaded_ = 0;       // layers that have their normals
   std::size_t settled_ = 0;         // windows

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "server/mesh/extract/extract.h"
+#include "server/mesh/extract/windows.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/kernels.h"
 
@@ -65,8 +65,7 @@ mesh::Mesh noise_surface(Bytes& bytes) {
       .scheme = (options & 1U) != 0 ? Scheme::kFive : Scheme::kSix,
       .close = (options & 2U) != 0};
   mesh::Mesh mesh;
-  mesh::extract_surface(lattice, extraction, mesh::count_surface(lattice, extraction, {}), {},
-                        mesh);
+  mesh::SurfaceWindows(lattice, extraction, {}).write_whole({}, mesh);
   if ((options & 4U) != 0) mesh::smooth({.steps = test::means(2, {1})}, {}, mesh);
   return mesh;
 }

@@ -50,6 +50,9 @@ void work(const JobOrder& order) {
   if (order.iso == test::kRunsOutOfTime) std::raise(SIGXCPU);
   if (order.iso == test::kIsDeaf) ::sleep(3600);
   if (order.iso == test::kTalksNonsense) say("nonsense\n");
+  if (order.iso == test::kHasNoRoom) {
+    return say(to_line(JobAnswer(Error(ErrorCode::kOutOfSpace, "the disk has no room"))));
+  }
   if (order.iso == test::kMakesAnotherFile) say(to_line(JobPiece{.file = 1, .bytes = 1}));
   if (order.iso == test::kDiesInAFile) {
     say(to_line(JobPiece{.file = 0, .bytes = 1000}) + "some");

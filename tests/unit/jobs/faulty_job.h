@@ -14,5 +14,6 @@ inline constexpr double kNeverBegins = 7;  // but ends
 inline constexpr double kTalksForEver = 8;
 inline constexpr double kDiesInAFile = 9;  // before the bytes that it has announced
 inline constexpr double kRunsOutOfTime = 10;
+inline constexpr double kHasNoRoom = 11;  // on the disk for what it sets aside
 
 }  // namespace isomesh::test

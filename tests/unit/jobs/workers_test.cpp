@@ -17,6 +17,7 @@
 #include "server/mesh/parallel.h"
 #include "tests/support/process.h"
 #include "tests/support/stores.h"
+#include "tests/unit/jobs/faulty_job.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -237,6 +238,16 @@ TEST_F(WorkersTest, AJobWhoseStorageFailsWhileTheDaemonEndsIsPutBackUncharged) {
     EXPECT_EQ(jobs_.account(id).attempts, 0);
     jobs_.cancel("", id);
   }
+}
+
+// As when its spool finds no room.
+TEST_F(WorkersTest, AJobWhoseProcessFindsTheDiskFullWaitsUncharged) {
+  WorkerOptions options = threads(1);
+  options.program = job_program(FAULTY_JOB);
+  const std::string id = submit(parameters_of(add_sphere(), test::kHasNoRoom));
+  const Workers workers(options, jobs_, volumes_, blobs_);
+  EXPECT_TRUE(eventually([&] { return is_put_back_uncharged(id); }));
+  EXPECT_EQ(jobs_.get("", id).waiting_for, WaitingFor::kDisk);
 }
 
 TEST_F(WorkersTest, AJobThatTakesTooLongFails) {

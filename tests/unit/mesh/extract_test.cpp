@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/extract/windows.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/unit/mesh/reference_surface.h"
@@ -94,34 +95,18 @@ TEST(ExtractMemory, OfALargerMeshIsReusedWithoutATrace) {
   EXPECT_EQ(mesh.triangles.size(), 0U);
 }
 
-TEST(ExtractMemory, IsNotTakenForMoreVerticesThanIndicesCanName) {
-  const auto volume = test::checkerboard<std::uint8_t>(0, 9, {4, 4, 4});
-  const ExtractOptions options = {5, Scheme::kSix, Interpolation::kLinear};
-  SurfaceCount count = count_surface(volume.lattice(), options, {});
-  count.layer_vertices.back() = std::uint64_t{1} << 33;
-  Mesh mesh;
-  try {
-    extract_surface(volume.lattice(), options, count, {}, mesh);
-    FAIL() << "it was not refused";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
-  }
-  EXPECT_EQ(mesh.positions.capacity_bytes(), 0U);
-  EXPECT_EQ(mesh.triangles.capacity_bytes(), 0U);
-}
-
 TEST(ExtractCancellation, BeforeTheStartEndsBothPasses) {
   const auto volume = many_layers();
   std::stop_source source;
   source.request_stop();
   const Context stopped{source.get_token(), {}};
   for (const ExtractOptions& options : all_options(80)) {
-    const SurfaceCount count = count_surface(volume.lattice(), options, {});
+    const auto lattice = volume.lattice();
+    SurfaceWindows windows(lattice, options, {});
     EXPECT_EQ(test::code_thrown_by([&] { count_surface(volume.lattice(), options, stopped); }),
               ErrorCode::kCancelled);
     Mesh mesh;
-    EXPECT_EQ(test::code_thrown_by(
-                  [&] { extract_surface(volume.lattice(), options, count, stopped, mesh); }),
+    EXPECT_EQ(test::code_thrown_by([&] { windows.write_whole(stopped, mesh); }),
               ErrorCode::kCancelled);
   }
 }
@@ -129,7 +114,8 @@ TEST(ExtractCancellation, BeforeTheStartEndsBothPasses) {
 TEST(ExtractCancellation, OnTheWayEndsBothPasses) {
   const auto volume = test::noise<std::uint8_t>({0, 0, 0, 0, 9}, {33, 17, 1200}, 21);
   const ExtractOptions options = {5, Scheme::kSix, Interpolation::kLinear};
-  const SurfaceCount count = count_surface(volume.lattice(), options, {});
+  const auto lattice = volume.lattice();
+  SurfaceWindows windows(lattice, options, {});
   for (const int threads : {1, 2}) {
     const test::ThreadCount limit(threads);
     std::stop_source counting;
@@ -141,11 +127,10 @@ TEST(ExtractCancellation, OnTheWayEndsBothPasses) {
     std::stop_source writing;
     const Context stops_writing{writing.get_token(), [&](double) { writing.request_stop(); }};
     Mesh mesh;
-    EXPECT_EQ(test::code_thrown_by(
-                  [&] { extract_surface(volume.lattice(), options, count, stops_writing, mesh); }),
+    EXPECT_EQ(test::code_thrown_by([&] { windows.write_whole(stops_writing, mesh); }),
               ErrorCode::kCancelled);
     // A mesh left by a cancelled job does not affect the next extraction.
-    extract_surface(volume.lattice(), options, count, {}, mesh);
+    windows.write_whole({}, mesh);
     EXPECT_TRUE(test::same_bytes(mesh, test::extracted(volume, options)));
   }
 }
@@ -163,10 +148,11 @@ TEST(ExtractProgress, RisesToOne) {
     reports.clear();
   };
   const ExtractOptions options = {80, Scheme::kFive, Interpolation::kLinear};
-  const SurfaceCount count = count_surface(volume.lattice(), options, context);
+  const auto lattice = volume.lattice();
+  SurfaceWindows windows(lattice, options, context);
   expect_rise();
   Mesh mesh;
-  extract_surface(volume.lattice(), options, count, context, mesh);
+  windows.write_whole(context, mesh);
   expect_rise();
 }
 

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/extract/extract.h"
+#include "server/mesh/extract/windows.h"
 #include "tests/support/joined.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
@@ -35,10 +36,11 @@ void extract_as_reference(const test::SampleVolume<T>& volume, const ExtractOpti
                           test::ScalarSurface& reference, Mesh& mesh) {
   reference = test::scalar_surface(test::in_doubles(volume).lattice(), options);
   const Lattice<T> lattice = volume.lattice();
-  const SurfaceCount count = count_surface(lattice, options, {});
+  SurfaceWindows windows(lattice, options, {});
+  const SurfaceCount& count = windows.count();
   ASSERT_EQ(count.layer_vertices, reference.layer_vertices);
   ASSERT_EQ(count.layer_triangles, reference.layer_triangles);
-  extract_surface(lattice, options, count, {}, mesh);
+  windows.write_whole({}, mesh);
   EXPECT_EQ(mesh.origin, lattice.to_space.origin);
   ASSERT_TRUE(test::matches(mesh, reference));
 }

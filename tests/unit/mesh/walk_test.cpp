@@ -1,6 +1,7 @@
 #include "server/mesh/walk/walk.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <memory>
 #include <set>
@@ -12,9 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "base/mutex.h"
-#include "server/mesh/extract/joined_layers.h"
-#include "server/mesh/extract/slab_passes.h"
-#include "server/mesh/lattice/bcc_faces.h"
+#include "server/mesh/extract/windows.h"
 #include "server/mesh/measure/normals.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/topology/window_topology.h"
@@ -323,48 +322,6 @@ TEST(Walk, MakesTheSameWithASpool) {
   }
 }
 
-// Looks at what the count holds whenever a layer is set aside.
-class WatchingSpool : public test::MemorySpool {
- public:
-  void watch(const std::vector<ClusterLayer>& layers) { layers_ = &layers; }
-
-  void write(std::uint64_t at, std::span<const std::byte> bytes) override {
-    std::size_t held = 0;
-    for (const ClusterLayer& layer : *layers_) {
-      held += layer.words.size() * sizeof(JoiningWord) + layer.joined.size() * sizeof(Joined);
-    }
-    most_ = std::max(most_, held);
-    test::MemorySpool::write(at, bytes);
-  }
-  std::size_t most() const { return most_; }
-
- private:
-  const std::vector<ClusterLayer>* layers_ = nullptr;
-  std::size_t most_ = 0;
-};
-
-TEST(SurfaceWindows, HoldWhatOneLayerJoinsWhileTheyCount) {
-  const test::ThreadCount one(1);
-  const auto most_of = [](std::uint32_t layers) {
-    const Bytes volume =
-        test::sample<std::uint8_t>(test::scaled(test::gyroid(8), 50, 60), {24, 24, layers});
-    const auto lattice = volume.lattice();
-    const ExtractOptions options = {.iso = 60, .regularize = true};
-    const Extraction extraction(lattice, options, std::uint8_t{60});
-    SurfaceCount count = empty_count(layers);
-    count.clusters.resize(layers);
-    WatchingSpool spool;
-    spool.watch(count.clusters);
-    JoinedLayers joined(count.clusters, &spool);
-    joined.prepare();
-    count_pass(extraction, {}, count, [&](std::uint32_t z) { joined.put_aside(z); });
-    return spool.most();
-  };
-  const std::size_t most = most_of(64);
-  EXPECT_EQ(most_of(128), most);
-  EXPECT_GT(most, 0U);
-}
-
 TEST(Walk, SaysThatTheSpoolIsFull) {
   const Bytes volume = specks();
   test::MemorySpool spool(1000);
@@ -372,38 +329,30 @@ TEST(Walk, SaysThatTheSpoolIsFull) {
   EXPECT_EQ(test::code_thrown_by([&] { windows_of(one); }), ErrorCode::kOutOfSpace);
 }
 
-// Joined crossings that a slab has no business with may be missing or wrong.
-TEST(WriteSlab, ReadsJoinedCrossingsOfTwoPlanesBehindAndOneRow) {
+// Fails when so many arrays have been read from it.
+class FailingSpool : public test::MemorySpool {
+ public:
+  void read(std::uint64_t at, std::span<std::byte> bytes) const override {
+    if (++reads_ > 40) throw Error(ErrorCode::kInternal, "what was set aside is not there");
+    test::MemorySpool::read(at, bytes);
+  }
+
+ private:
+  mutable std::atomic<int> reads_ = 0;
+};
+
+TEST(Walk, EndsWithWhatTheSpoolThrows) {
   const Bytes volume = specks();
-  const auto lattice = volume.lattice();
-  for (const Scheme scheme : test::kSchemes) {
-    const ExtractOptions options = {.iso = 60, .scheme = scheme, .regularize = true};
-    const SurfaceCount count = count_surface(lattice, options, {});
-    const std::size_t rows_of_samples = scheme == Scheme::kBcc ? 2 : 1;
-    const auto written = [&](const Slab& slab, const SurfaceCount& from) {
-      Extraction extraction(lattice, options, std::uint8_t{60});
-      extraction.keep(from.clusters);
-      IndexMemory memory(index_memory_size(extraction.dims, kBccPlaces));
-      Mesh mesh;
-      make_room(from, lattice.to_space, false, mesh);
-      std::ranges::fill(mesh.positions, Vec3{});
-      std::ranges::fill(mesh.triangles, Triangle{});
-      write_slab(extraction, slab, memory, mesh);
-      return mesh;
-    };
-    for (const std::uint32_t begin : {0U, 7U, 30U}) {
-      const Slab slab = {begin, begin + 4};
-      SurfaceCount poisoned = count;
-      for (std::uint32_t z = 0; z < count.clusters.size(); ++z) {
-        ClusterLayer& layer = poisoned.clusters[z];
-        if (layer.words.empty() || (z >= slab.begin && z < slab.end + 2)) continue;
-        const std::size_t kept = z == slab.end + 2 ? layer.row_begin[rows_of_samples] : 0;
-        for (std::size_t w = kept; w < layer.words.size(); ++w) {
-          layer.words[w] = {~std::uint64_t{0}, 1U << 30, 1U << 30};
-        }
-      }
-      EXPECT_TRUE(test::same_bytes(written(slab, count), written(slab, poisoned)));
-    }
+  for (const int threads : {1, 2, 8}) {
+    const test::ThreadCount several(threads);
+    FailingSpool spool;
+    const Case one = {volume, {.iso = 60, .regularize = true}, {.steps = means(5, {1})}, &spool};
+    SurfaceWindows windows = windows_of(one);
+    Collector collector(windows.count());
+    EXPECT_EQ(test::code_thrown_by([&] {
+                walk(windows, {one.smooth, 1, true}, {}, collector);
+              }),
+              ErrorCode::kInternal);
   }
 }
 
