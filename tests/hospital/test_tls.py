@@ -152,25 +152,29 @@ class Encrypted(Receiver):
 
     def test_a_new_certificate(self):
         """Files are read again when they change; those that cannot be used change nothing."""
-        files = [os.path.join(self.folder.name, name) for name in ("used.pem", "used.key")]
+        files = [os.path.join(self.folder.name, name) for name in ("used.pem", "used.key", "ca.pem")]
 
-        def use(identity):
-            for source, target in zip(identity, files):
+        def use(certificate, key, authority):
+            for source, target in zip((certificate, key, authority), files):
                 shutil.copy(source, target + ".new")
                 os.replace(target + ".new", target)
 
-        use(self.ours)
-        daemon = self.tls_daemon(dimse=self.secured(certificate=files[0], key=files[1]))
+        use(*self.ours, self.hospital.file)
+        daemon = self.tls_daemon(dimse=self.secured(certificate=files[0], key=files[1], ca=files[2]))
+        another = self.options(self.hospital.issue("ct3.example.org"))
+        self.assertTrue(self.echo(daemon, *another))
+        # The certificate of a device, in place of its authority's.
+        use(*self.ours, self.scanner[0])
         self.assertTrue(self.echo(daemon, *self.options()))
-        use(self.other.issue("127.0.0.1"))
-        self.assertFalse(self.echo(daemon, *self.options()))
+        self.assertFalse(self.echo(daemon, *another))
+        use(*self.other.issue("127.0.0.1"), self.hospital.file)
+        self.assertFalse(self.echo(daemon, *another))
         with open(files[0], "w", encoding="utf-8") as file:
             file.write("nothing")
-        self.assertFalse(self.echo(daemon, *self.options()))
+        self.assertFalse(self.echo(daemon, *another))
         self.assertIn("are not used", daemon.logged())
-        use(self.ours)
-        self.assertTrue(self.echo(daemon, *self.options()))
-
+        use(*self.ours, self.hospital.file)
+        self.assertTrue(self.echo(daemon, *another))
 
     def test_whom_isomesh_sends_to(self):
         """To storescp, which needs certificates of its peers."""
