@@ -57,6 +57,8 @@ void load_certificate(SSL_CTX* context, const TlsIdentity& identity) {
 }
 
 void load_authorities(SSL_CTX* context, const TlsFile& authorities) {
+  // A certificate of a peer, without its authority, is trusted as well.
+  X509_STORE_set_flags(SSL_CTX_get_cert_store(context), X509_V_FLAG_PARTIAL_CHAIN);
   if (SSL_CTX_load_verify_file(context, authorities.path.c_str()) == 1) return;
   ERR_clear_error();
   throw invalid_parameter(authorities.option,
@@ -70,9 +72,6 @@ TlsContext tls_server_context(const TlsIdentity& identity) {
   load_certificate(context.get(), identity);
   if (!identity.authorities.path.empty()) {
     load_authorities(context.get(), identity.authorities);
-    // So that a client with several certificates sends the right one.
-    SSL_CTX_set_client_CA_list(context.get(),
-                               SSL_load_client_CA_file(identity.authorities.path.c_str()));
     SSL_CTX_set_verify(context.get(), SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, nullptr);
     // A resumed session would skip the verification, with other files perhaps.
     SSL_CTX_set_session_cache_mode(context.get(), SSL_SESS_CACHE_OFF);

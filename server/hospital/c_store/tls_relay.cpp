@@ -100,9 +100,10 @@ TlsRelay::~TlsRelay() {
 
 bool TlsRelay::is_certified_as(const std::string& name) const {
   const Lock lock(mutex_);
+  if (!certificate_) return false;
   constexpr unsigned kFlags = X509_CHECK_FLAG_NO_WILDCARDS;
-  return certificate_ &&
-         X509_check_host(certificate_.get(), name.c_str(), name.size(), kFlags, nullptr) == 1;
+  return X509_check_host(certificate_.get(), name.c_str(), name.size(), kFlags, nullptr) == 1 ||
+         X509_check_ip_asc(certificate_.get(), name.c_str(), 0) == 1;
 }
 
 void TlsRelay::run() {
@@ -159,6 +160,7 @@ void TlsRelay::carry() {
   // A peer that has closed the connection may have said why.
   Waits unused;
   if (out.is_broken()) in.step(unused);
+  has_ended_silently_ = in.has_ended() && !in.has_moved();
 }
 
 // A connection that is closed with unread bytes is reset, and the peer could lose the alert that

@@ -75,6 +75,10 @@ void read_tls(Section& section, PacsSettings& pacs) {
     if (pacs.send_by != SendBy::kCStore) {
       refuse(section.key_of("tls"), "is for send-by = \"c-store\"; dicomweb has https://");
     }
+    if (pacs.certificate_name == "*" && pacs.ca_file.empty()) {
+      refuse(section.key_of("certificate-name"),
+             "\"*\" needs ca-file: any server has a certificate of the system's authorities");
+    }
     return;
   }
   if (!pacs.certificate_name.empty() || !pacs.certificate_file.empty()) {

@@ -127,6 +127,9 @@ TEST(HospitalSettings, NamesWhatIsWrong) {
       {with("send-by = \"stow\"", "tls = \"yes\""), "pacs[0].tls: must be true or false"},
       {with("send-by = \"stow\"", kSend + "certificate-name = \"x\""),
        "pacs[0].tls: must be true if"},
+      {std::string(kWhole) + "[[pacs]]\nname = \"b\"\n" + kSend +
+           "tls = true\ncertificate-name = \"*\"\n",
+       "pacs[1].certificate-name: \"*\" needs ca-file"},
       {with("send-by = \"stow\"", kSend + "tls = true\nkey-file = \"k\""),
        "pacs[0].certificate-file: must be given together"},
       {std::string(kWhole) + "max-error-mm = 0\n", "rules[0].max-error-mm"},
