@@ -62,9 +62,18 @@ class OpenApiTest : public testing::Test {
       R"({"source": {"pacs": "absent", "study": "1.2", "series": "1.3"},
           "parameters": {"iso": 1}, "send": [{"pacs": "absent"}]})";
 
+  // As POST /v1/dicomweb/workitems accepts it.
+  static constexpr const char* kWorkitem =
+      R"({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
+          "00741200": {"vr": "CS", "Value": ["LOW"]}, "00741204": {"vr": "LO", "Value": ["Mesh"]},
+          "00404041": {"vr": "CS", "Value": ["READY"]},
+          "00404005": {"vr": "DT", "Value": ["20260101"]}})";
+
   const HospitalFile hospital_;
   Daemon daemon_{{"--hospital", hospital_.path()}};
   const Order order_ = order_from_json(daemon_.send("POST", "/v1/orders", kOrder).body);
+  const Answer workitem_ = daemon_.send("POST", "/v1/dicomweb/workitems?1.2.3", kWorkitem,
+                                        {{"Content-Type", "application/dicom+json"}});
   const Job job_ = finished_job(daemon_);
   const OpenApi api_{daemon_.get("/openapi.yaml").body};
 };

@@ -270,29 +270,24 @@ void probe_orders(Statuses& statuses, const Order& order, const std::string& bod
   statuses.probe("DELETE /v1/orders/{id}", one);
 }
 
-void probe_worklist(Statuses& statuses) {
+void probe_worklist(Statuses& statuses, const std::string& item) {
   const std::string all = "/v1/dicomweb/workitems";
   const std::string one = all + "/1.2.9";
-  const Headers json = {{"Content-Type", "application/dicom+json"}};
-  const std::string item =
-      R"({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
-          "00741200": {"vr": "CS", "Value": ["LOW"]}, "00741204": {"vr": "LO", "Value": ["Mesh"]},
-          "00404041": {"vr": "CS", "Value": ["READY"]},
-          "00404005": {"vr": "DT", "Value": ["20260101"]}})";
+  const Headers dicom_json = {{"Content-Type", "application/dicom+json"}};
   const std::string claim =
       R"({"00741000": {"vr": "CS", "Value": ["IN PROGRESS"]},
           "00081195": {"vr": "UI", "Value": ["1.99"]}})";
-  statuses.probe("GET " + all, all);
-  for (int n = 0; n < 2; ++n) statuses.probe("POST " + all, all + "?1.2.9", item, json);
+  statuses.probe("GET " + all, all + "?PatientID=nobody");
+  for (int n = 0; n < 2; ++n) statuses.probe("POST " + all, all + "?1.2.9", item, dicom_json);
   statuses.probe("GET " + all, all);
   statuses.probe("GET " + all, all + "?x=1");
   statuses.probe("GET " + all + "/{uid}", one);
   statuses.probe("GET " + all + "/{uid}", one + "?x=1");
   for (int n = 0; n < 2; ++n)
-    statuses.probe("PUT " + all + "/{uid}/state", one + "/state", claim, json);
-  statuses.probe("POST " + all + "/{uid}", one + "?1.99", "{}", json);
+    statuses.probe("PUT " + all + "/{uid}/state", one + "/state", claim, dicom_json);
+  statuses.probe("POST " + all + "/{uid}", one + "?1.99", "{}", dicom_json);
   statuses.probe("POST " + all + "/{uid}/cancelrequest", one + "/cancelrequest");
-  statuses.probe("POST " + all, all + "?1.2.10", item, json);
+  statuses.probe("POST " + all, all + "?1.2.10", item, dicom_json);
   statuses.probe("POST " + all + "/{uid}/cancelrequest", all + "/1.2.10/cancelrequest");
   statuses.probe("GET " + all + "/{uid}", all + "/1.2.11");
   for (const auto& [operation, path] :
@@ -300,9 +295,9 @@ void probe_worklist(Statuses& statuses) {
         {"POST " + all + "/{uid}", "/1.2.11"},
         {"PUT " + all + "/{uid}/state", "/1.2.11/state"},
         {"POST " + all + "/{uid}/cancelrequest", "/1.2.11/cancelrequest"}}) {
-    statuses.probe(operation, all + path, claim, json);
-    statuses.probe(operation, all + path, "[", json);
-    statuses.probe(operation, all + path, std::string(1'100'000, ' '), json);
+    statuses.probe(operation, all + path, claim, dicom_json);
+    statuses.probe(operation, all + path, "[", dicom_json);
+    statuses.probe(operation, all + path, std::string(1'100'000, ' '), dicom_json);
     statuses.probe(operation, all + path, "{}", {{"Content-Type", "text/plain"}});
     statuses.see_without_length(operation, all + path);
   }
@@ -332,7 +327,7 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   probe_uploads(statuses, daemon_);
   probe_damaged(statuses, daemon_);
   probe_orders(statuses, order_, kOrder);
-  probe_worklist(statuses);
+  probe_worklist(statuses, kWorkitem);
   for (const auto& path : api_.paths()) {
     for (const auto& operation : path.second) {
       std::string name = operation.first.as<std::string>();

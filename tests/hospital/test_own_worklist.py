@@ -1,7 +1,9 @@
 """isomesh as a worklist (UPS-RS): what it accepts, who may do it, and isomesh as its performer."""
+import contextlib
 import json
 import os
 import random
+import sqlite3
 import subprocess
 import time
 
@@ -181,6 +183,15 @@ class OwnWorklist(Loop):
         self.assertEqual((status, warning),
                          (202, "The UPS is already in the requested state of CANCELED."))
         self.assertNotIn("1.99", daemon.logged())
+        # What nobody changes for --keep-days is removed.
+        daemon.kill()
+        with contextlib.closing(sqlite3.connect(os.path.join(daemon.data, "isomesh.sqlite"))) as all_:
+            all_.execute("UPDATE workitems SET changed = changed - ? WHERE uid = ?",
+                         (40 * 86_400_000_000, uid))
+            all_.commit()
+        daemon.start()
+        peers.until(lambda: self.ask(daemon, "GET", "/" + uid)[0] == 404)
+        self.assertEqual(len(self.ask(daemon, "GET", "")[2]), 1)
 
     def test_who_may_do_what(self):
         tokens = os.path.join(self.folder.name, "tokens-" + self.uid())

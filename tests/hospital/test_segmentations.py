@@ -39,6 +39,16 @@ def label_of(x, y, z):
 
 SIZE, SLICES = 23, 12
 
+# What pydicom reads of a segmentation: of each frame the slice, the segment and the samples.
+READER = """
+import json, sys, pydicom
+data = pydicom.dcmread(sys.argv[1])
+groups = data.PerFrameFunctionalGroupsSequence
+print(json.dumps([[float(group.PlanePositionSequence[0].ImagePositionPatient[2]),
+                   int(group.SegmentIdentificationSequence[0].ReferencedSegmentNumber),
+                   frame.ravel().tolist()] for group, frame in zip(groups, data.pixel_array)]))
+"""
+
 
 class Segmentations(Loop):
     assert_judged = Objects.assert_judged
@@ -96,6 +106,10 @@ class Segmentations(Loop):
                 if any(bits):
                     wanted[z, number] = bits
         self.assertEqual(frames, wanted)
+        # Debian's pydicom and numpy belong to Debian's Python.
+        read = json.loads(subprocess.run(["/usr/bin/python3", "-c", READER, path], check=True,
+                                         capture_output=True, text=True).stdout)
+        self.assertEqual({(round(z / 2), segment): bits for z, segment, bits in read}, wanted)
         sources = self.value(path, "0008,1155")
         self.assertTrue(all(f"[{each}]" in sources for each in series.instances))
         # isomesh itself reads the same labels in the same places.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <memory>
+#include <optional>
 
 #include "proto/error.h"
 #include "proto/samples.h"

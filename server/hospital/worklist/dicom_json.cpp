@@ -117,11 +117,11 @@ DataSet parse_data_set(std::string_view text) {
 }
 
 const std::vector<json>& values_of(const DataSet& data, std::string_view tag) {
-  static const std::vector<json> kNone;
+  static const std::vector<json> none;
   const auto found = data.find(std::string(tag));
-  if (found == data.end()) return kNone;
+  if (found == data.end()) return none;
   const auto values = found->find("Value");
-  return values == found->end() ? kNone : values->get_ref<const json::array_t&>();
+  return values == found->end() ? none : values->get_ref<const json::array_t&>();
 }
 
 std::string text_of(const DataSet& data, std::string_view tag) {

@@ -10,6 +10,7 @@
 #include "proto/samples.h"
 #include "server/hospital/orders/label_grid.h"
 #include "server/volume/canonical.h"
+#include "tests/support/errors.h"
 #include "tests/unit/hospital/fixture.h"
 
 namespace isomesh::orders {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/hospital/worklist/query.h"
-#include "tests/support/files.h"
+#include "tests/support/errors.h"
 #include "tests/unit/hospital/worklist.h"
 
 namespace isomesh::worklist {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/files.h"
+#include "tests/support/errors.h"
 #include "tests/unit/hospital/worklist.h"
 
 namespace isomesh::worklist {
