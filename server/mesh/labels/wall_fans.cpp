@@ -180,7 +180,10 @@ void WallFans::find_neighbors(const Context& context) {
       std::ranges::sort(list);
       list.erase(std::unique(list.begin(), list.end()), list.end());
     }
-    for (std::uint32_t& each : list) each = find(each, walls_[fan]);
+    for (std::uint32_t& each : list) {
+      const bool is_alone = first_[each + 1] - first_[each] == 1;
+      each = is_alone ? first_[each] : find(each, walls_[fan]);
+    }
   });
 }
 
