@@ -17,7 +17,8 @@
 namespace isomesh::mesh {
 namespace {
 
-// The vertices that some triangles name, renumbered from 0 in the same order.
+// The vertices that some triangles name, renumbered from 0 in the same order. A thread may have one
+// at a time.
 class VertexChoice {
  public:
   VertexChoice(std::span<const Triangle> all, std::span<const std::uint32_t> triangles) {
@@ -41,14 +42,18 @@ class VertexChoice {
       word.before = count_;
       count_ += bits_of(word.chosen);
     }
+    thread_local std::vector<std::uint32_t> numbers;  // keeps its memory
+    numbers.resize(std::max<std::size_t>(numbers.size(), words_.size() * kWordBits));
+    numbers_ = numbers.data();
+    std::uint32_t next = 0;
+    visit([&](std::uint64_t vertex) { numbers_[vertex - first_word_ * kWordBits] = next++; });
   }
 
   std::uint32_t count() const { return count_; }
 
   // The number of a vertex that is chosen.
   std::uint32_t operator[](std::uint32_t vertex) const {
-    const Word& word = words_[vertex / kWordBits - first_word_];
-    return word.before + bits_of(word.chosen & ((std::uint32_t{1} << (vertex % kWordBits)) - 1));
+    return numbers_[vertex - first_word_ * kWordBits];
   }
 
   // How many there are before `vertex`, chosen or not.
@@ -56,7 +61,8 @@ class VertexChoice {
     const std::uint64_t at = vertex / kWordBits;
     if (at < first_word_) return 0;
     if (at >= first_word_ + words_.size()) return count_;
-    return (*this)[static_cast<std::uint32_t>(vertex)];
+    const Word& word = words_[at - first_word_];
+    return word.before + bits_of(word.chosen & ((std::uint32_t{1} << (vertex % kWordBits)) - 1));
   }
 
   // In their order.
@@ -85,6 +91,7 @@ class VertexChoice {
 
   std::uint64_t first_word_ = 0;
   std::vector<Word> words_;
+  std::uint32_t* numbers_ = nullptr;  // from that of the first word's first vertex on
   std::uint32_t count_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "server/mesh/parallel.h"
@@ -19,10 +20,13 @@ struct WallFans::Corner {
 
 // Fans of the vertices of one layer.
 struct WallFans::Layer {
-  std::vector<std::uint32_t> fans;  // of each vertex
-  std::vector<Wall> walls;          // of each fan, as all that follow
-  std::vector<Kind> kinds;
-  std::vector<std::uint32_t> sizes;
+  struct Fan {
+    std::uint64_t vertex = 0;
+    Wall wall;
+    Kind kind = Kind::kClosed;
+    std::uint32_t size = 0;  // of its part of the ring
+  };
+  std::vector<Fan> fans;
   std::vector<std::uint32_t> ring;
 };
 
@@ -81,10 +85,7 @@ WallFans::Layer WallFans::layer_of(const SeparatingSurface& surface,
   visit_corners([&](std::uint64_t v, std::uint32_t corner) { sorted[ends[v]++] = corner; });
 
   Layer result;
-  result.fans.assign(vertices, 0);
-  result.walls.reserve(vertices + vertices / 4);
-  result.kinds.reserve(vertices + vertices / 4);
-  result.sizes.reserve(vertices + vertices / 4);
+  result.fans.reserve(vertices + vertices / 4);
   result.ring.reserve(sorted.size() + sorted.size() / 8);
   std::vector<Corner> corners;
   std::uint32_t begin = 0;
@@ -109,10 +110,9 @@ WallFans::Layer WallFans::layer_of(const SeparatingSurface& surface,
       end = std::find_if(at, corners.end(),
                          [&](const Corner& corner) { return corner.wall != at->wall; });
       const std::size_t before = result.ring.size();
-      ++result.fans[v];
-      result.walls.push_back(at->wall);
-      result.kinds.push_back(append_ring({at, end}, result.ring));
-      result.sizes.push_back(static_cast<std::uint32_t>(result.ring.size() - before));
+      const Kind kind = append_ring({at, end}, result.ring);
+      const auto size = static_cast<std::uint32_t>(result.ring.size() - before);
+      result.fans.push_back({first + v, at->wall, kind, size});
     }
   }
   return result;
@@ -129,7 +129,7 @@ WallFans::WallFans(const SeparatingSurface& surface, std::span<const std::uint8_
   std::vector<std::uint64_t> fans_before(layers + 1, 0);
   std::vector<std::uint64_t> ring_before(layers + 1, 0);
   for (std::size_t layer = 0; layer < layers; ++layer) {
-    fans_before[layer + 1] = fans_before[layer] + all[layer].walls.size();
+    fans_before[layer + 1] = fans_before[layer] + all[layer].fans.size();
     ring_before[layer + 1] = ring_before[layer] + all[layer].ring.size();
   }
   if (fans_before[layers] > std::numeric_limits<std::int32_t>::max()) {
@@ -147,20 +147,18 @@ WallFans::WallFans(const SeparatingSurface& surface, std::span<const std::uint8_
   ring_begin_[fans_before[layers]] = ring_before[layers];
   parallel_for(context, layers, [&](std::size_t layer) {
     Layer& here = all[layer];
-    std::ranges::copy(here.walls, walls_.begin() + fans_before[layer]);
-    std::ranges::copy(here.kinds, kinds_.begin() + fans_before[layer]);
     std::ranges::copy(here.ring, ring_.begin() + ring_before[layer]);
     std::uint64_t fan = fans_before[layer];
     std::uint64_t begin = ring_before[layer];
-    for (std::size_t v = 0; v < here.fans.size(); ++v) {
-      const std::uint64_t vertex = mesh.layer_vertices[layer] + v;
-      first_[vertex] = static_cast<std::uint32_t>(fan);
-      for (std::uint32_t n = 0; n < here.fans[v]; ++n, ++fan) {
-        vertex_[fan] = static_cast<std::uint32_t>(vertex);
-        ring_begin_[fan] = begin;
-        begin += here.sizes[fan - fans_before[layer]];
-      }
+    std::uint64_t next = mesh.layer_vertices[layer];
+    for (const Layer::Fan& each : here.fans) {
+      while (next <= each.vertex) first_[next++] = static_cast<std::uint32_t>(fan);
+      vertex_[fan] = static_cast<std::uint32_t>(each.vertex);
+      walls_[fan] = each.wall;
+      kinds_[fan] = each.kind;
+      ring_begin_[fan++] = std::exchange(begin, begin + each.size);
     }
+    while (next < mesh.layer_vertices[layer + 1]) first_[next++] = static_cast<std::uint32_t>(fan);
     here = {};
   });
   find_neighbors(context);
@@ -180,7 +178,10 @@ void WallFans::find_neighbors(const Context& context) {
       std::ranges::sort(list);
       list.erase(std::unique(list.begin(), list.end()), list.end());
     }
-    for (std::uint32_t& each : list) each = find(each, walls_[fan]);
+    for (std::uint32_t& each : list) {
+      const bool is_alone = first_[each + 1] - first_[each] == 1;
+      each = is_alone ? first_[each] : find(each, walls_[fan]);
+    }
   });
 }
 
@@ -188,10 +189,11 @@ std::uint64_t WallFans::bytes(std::uint64_t vertices, std::uint64_t triangles) {
   // A vertex where three walls meet has three fans. A quarter of all vertices is a high estimate.
   // An open ring has one corner more than triangles.
   const std::uint64_t fans = vertices + vertices / 2;
-  const std::uint64_t gathered =
-      fans * (sizeof(Wall) + sizeof(Kind)) + (3 * triangles + fans) * sizeof(std::uint32_t);
-  return 2 * gathered + NeighborLists::bytes(fans) + vertices * sizeof(std::uint32_t) +
-         fans * (sizeof(std::uint32_t) + sizeof(std::uint64_t));
+  const std::uint64_t ring = (3 * triangles + fans) * sizeof(std::uint32_t);
+  const std::uint64_t kept =
+      fans * (sizeof(std::uint32_t) + sizeof(Wall) + sizeof(Kind) + sizeof(std::uint64_t)) +
+      vertices * sizeof(std::uint32_t) + ring + NeighborLists::bytes(fans);
+  return kept + fans * sizeof(Layer::Fan) + ring;  // while they are gathered
 }
 
 }  // namespace isomesh::mesh

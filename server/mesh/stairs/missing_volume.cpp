@@ -41,7 +41,7 @@ CornerShare share_of(Scheme scheme, const Links& links, Directions others) {
 class VoxelShares {
  public:
   VoxelShares(const SampleParts& parts, Scheme scheme, bool closed)
-      : parts_(parts), links_(links_of(scheme)), closed_(closed) {
+      : parts_(parts), scheme_(scheme), links_(links_of(scheme)), closed_(closed) {
     for (unsigned parity = 0; parity < 2; ++parity) {
       for (const auto& triangles : {links_.above(parity), links_.below(parity)}) {
         for (const Directions others : triangles) {
@@ -62,7 +62,7 @@ class VoxelShares {
   float of_whole(const VertexOwner& owner) const {
     float sum = 0;
     for (const CornerShare& corner : around(owner)) {
-      if ((corner.others & owner.directions) != 0) sum += corner.share;
+      sum += (corner.others & owner.directions) != 0 ? corner.share : 0;
     }
     return sum;
   }
@@ -83,6 +83,7 @@ class VoxelShares {
 
  private:
   std::span<const CornerShare> around(const VertexOwner& owner) const {
+    if (scheme_ == Scheme::kSix) return corners_[0];  // alike around each sample
     const auto [x, y, z] = index(owner);
     return corners_[(x + y + z) & 1];
   }
@@ -173,6 +174,7 @@ class VoxelShares {
   }
 
   const SampleParts& parts_;
+  const Scheme scheme_;
   const Links& links_;
   const bool closed_;
   std::array<std::vector<CornerShare>, 2> corners_;  // by parity

@@ -86,7 +86,7 @@ class Finder {
   void find_bends(std::size_t v) {
     Lanes normal = {};
     for (std::size_t fan = shape_.fans().begin(v); fan < shape_.fans().begin(v + 1); ++fan) {
-      normal += shape_.normal(fan);
+      normal += rotated(shape_.visit_normals(fan, [](Lanes) {}));
     }
     const Lanes in_samples = normal * shape_.spacing();
     const float size = length(in_samples);
@@ -156,7 +156,6 @@ class Finder {
   // All four within walls; a curve is near with all its strength beside it, and less with each edge
   // farther away.
   void spread_reach() {
-    const auto larger = [](Lanes a, Lanes b) { return a > b ? a : b; };
     Buffer<Lanes> other = filled(Lanes{});
     static_assert(kBendSteps % 2 == 0);  // the last writes to reach_
     const std::array<Buffer<Lanes>*, 2> turns = {&reach_, &other};

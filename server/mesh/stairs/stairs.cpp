@@ -30,10 +30,6 @@ constexpr double kSpreadTime = 12;
 constexpr double kSpreadDegree = 7;
 constexpr double kCurveTime = 30;
 constexpr int kCurveDegree = 10;
-// No coordinate moves farther from the start, in samples: what is owed may have no other place.
-constexpr float kMostSamples = 1.5F;
-// Only held vertices come nearer to the border of the volume or to caps than this, in samples.
-constexpr float kBorderRoom = 0.1F;
 // More uneven than this a lattice leaves nothing to be evened out.
 constexpr double kMostRatio = 5;
 
@@ -53,11 +49,11 @@ class Remover {
       // Curves along with the walls only once: this shrinks those that are round.
       filter(round == 0 ? mobility_.moving : moving_walls(), mobility_.moves, light, context_,
              shape_);
-      restore();
+      keeper_.restore(shape_);
     }
     if (!mobility_.curves.empty()) smooth_curves();
     for (int round = 0; round < kRestores; ++round) {
-      restore();
+      keeper_.restore(shape_);
       unfold(context_, shape_);
     }
   }
@@ -66,24 +62,6 @@ class Remover {
   std::vector<float> series(double degree, double time) const {
     const auto whole = static_cast<int>(std::lround(degree * std::sqrt(ratio_)));
     return diffusion_series(whole, time * ratio_);
-  }
-
-  // Moves the vertex back until each coordinate is within so many samples of the start, and within
-  // the volume.
-  void hold(std::size_t v, float samples) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const float from = shape_.start()[v][axis];
-      const float sample = std::abs(shape_.spacing()[axis]);
-      const float low = std::min(from, shape_.low()[axis] + kBorderRoom * sample);
-      const float high = std::max(from, shape_.high()[axis] - kBorderRoom * sample);
-      shape_.at[v][axis] = std::clamp(shape_.at[v][axis], std::max(low, from - samples * sample),
-                                      std::min(high, from + samples * sample));
-    }
-  }
-
-  void restore() {
-    keeper_.restore(shape_);
-    for_each(context_, shape_.vertices(), [&](std::size_t v) { hold(v, kMostSamples); });
   }
 
   std::vector<std::uint32_t> moving_walls() const {
@@ -100,7 +78,7 @@ class Remover {
     std::ranges::copy_if(mobility_.curves, std::back_inserter(moving),
                          [&](std::uint32_t v) { return mobility_.moves[v] > 0; });
     filter(moving, mobility_.moves, flat_series(kCurveDegree, kCurveTime), context_, shape_);
-    for (const std::uint32_t v : moving) hold(v, 1);
+    for (const std::uint32_t v : moving) shape_.hold(v, 1);
     constexpr std::array<float, 3> kHalfSteps = {0.25F, 0.5F, 0.25F};  // of the mean, squared
     filter(mobility_.beside, mobility_.moves, kHalfSteps, context_, shape_);
     keeper_.hold_curves();

@@ -47,13 +47,20 @@ WallNormals normals_of(const WallShape& shape, const Context& context,
   normals.own.resize_for_overwrite(fans.size());
   normals.near.resize_for_overwrite(fans.size());
   candidates.resize(chunks_of(fans.size()));
-  for_each(context, fans.size(), [&](std::size_t fan) {
-    const std::uint32_t v = fans.vertex(fan);
-    const Lanes sum = normals.own[fan] = shape.normal(fan);
-    fans.visit_triangles(fan, std::identity(), [&](std::uint32_t a, std::uint32_t b) {
-      if (!is_less(normal_of(shape, {v, a, b}), sum, kSuspect)) return;
-      candidates[fan / kChunk].push_back({static_cast<std::uint32_t>(fan), a, b});
-    });
+  for_chunks(context, fans.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<Lanes> each;  // of a fan's triangles
+    for (std::size_t fan = begin; fan < end; ++fan) {
+      each.clear();
+      const Lanes sum = shape.visit_normals(fan, [&](Lanes normal) { each.push_back(normal); });
+      normals.own[fan] = rotated(sum);
+      if (std::ranges::none_of(each, [&](Lanes own) { return is_less(own, sum, kSuspect); }))
+        continue;
+      auto normal = each.begin();
+      fans.visit_triangles(fan, std::identity(), [&](std::uint32_t a, std::uint32_t b) {
+        if (!is_less(*normal++, sum, kSuspect)) return;
+        candidates[begin / kChunk].push_back({static_cast<std::uint32_t>(fan), a, b});
+      });
+    }
   });
   for_each(context, fans.size(), [&](std::size_t fan) {
     Lanes sum = normals.own[fan];

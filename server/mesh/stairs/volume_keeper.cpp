@@ -10,6 +10,9 @@
 namespace isomesh::mesh {
 namespace {
 
+// No coordinate moves farther from the start, in samples: what is owed may have no other place.
+constexpr float kMostSamples = 1.5F;
+
 // Sums over the triangles of a fan.
 struct FanSums {
   Lanes normal = {};   // its length is twice the area
@@ -181,15 +184,15 @@ void VolumeKeeper::restore(WallShape& shape) const {
   normals.resize_for_overwrite(shape.fans().size());
   const Buffer<float> along = offsets(shape, normals);
   for_each(context_, shape.vertices(), [&](std::size_t v) {
-    if (!may_move(v)) return;
-    if (shape.is_curve(v)) {
-      shape.at[v] += way_of_curve(shape, v, along, normals);
-      return;
-    }
     const WallFans& fans = shape.fans();
-    for (std::size_t fan = fans.begin(v); fan < fans.begin(v + 1); ++fan) {
-      shape.at[v] += along[fan] * normals[fan];
+    if (may_move(v) && shape.is_curve(v)) {
+      shape.at[v] += way_of_curve(shape, v, along, normals);
+    } else if (may_move(v)) {
+      for (std::size_t fan = fans.begin(v); fan < fans.begin(v + 1); ++fan) {
+        shape.at[v] += along[fan] * normals[fan];
+      }
     }
+    shape.hold(v, kMostSamples);
   });
 }
 

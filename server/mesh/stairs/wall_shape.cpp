@@ -25,6 +25,7 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   }
   largest_spacing_ = std::max({spacing_[0], spacing_[1], spacing_[2]});
   smallest_spacing_ = std::min({spacing_[0], spacing_[1], spacing_[2]});
+  sample_ = spacing_;
   if (to_space.determinant() < 0) spacing_[0] = -spacing_[0];
 
   const Mesh& mesh = surface.mesh;

@@ -30,6 +30,8 @@ inline Lanes rotated(Lanes lanes) { return __builtin_shufflevector(lanes, lanes,
 inline Lanes twisted_cross(Lanes a, Lanes b) { return a * rotated(b) - rotated(a) * b; }
 inline Lanes cross(Lanes a, Lanes b) { return rotated(twisted_cross(a, b)); }
 
+inline Lanes smaller(Lanes a, Lanes b) { return a < b ? a : b; }
+inline Lanes larger(Lanes a, Lanes b) { return a > b ? a : b; }
 inline float length(Lanes a) { return std::sqrt(dot(a, a)); }
 
 // Places are along the lattice's axes, as if those were orthogonal, in one unit near the steps
@@ -55,9 +57,6 @@ class WallShape {
   float largest_spacing() const { return largest_spacing_; }
   float smallest_spacing() const { return smallest_spacing_; }
   bool is_closed() const { return closed_; }
-  // Opposite corners of the box of the outermost samples or, if closed, of the caps.
-  Lanes low() const { return low_; }
-  Lanes high() const { return high_; }
 
   // True where three or more walls meet, or one ends, or one leaves a cap.
   bool is_curve(std::size_t v) const { return (flags_[v] & kCurve) != 0; }
@@ -71,6 +70,15 @@ class WallShape {
       if ((flags_[v] >> axis & 1) != 0) way[axis] = 0;
     }
     return way;
+  }
+
+  // Moves a vertex back until each coordinate is within so many samples of the start, and within
+  // the volume. Only held vertices come nearer to its border or to caps than a tenth of a sample.
+  void hold(std::size_t v, float samples) {
+    const Lanes low = smaller(start_[v], low_ + 0.1F * sample_);
+    const Lanes high = larger(start_[v], high_ - 0.1F * sample_);
+    at[v] = smaller(larger(at[v], larger(low, start_[v] - samples * sample_)),
+                    smaller(high, start_[v] + samples * sample_));
   }
 
   // The neighbours of a vertex on a curve are those along it.
@@ -91,14 +99,20 @@ class WallShape {
     return neighbors_.sum(v, values) / static_cast<float>(neighbors_.degree(v));
   }
 
-  // The sum of the normals of a fan's triangles, whose lengths are twice their areas.
-  Lanes normal(std::size_t fan) const {
+  // Calls visit(normal) for the triangles of a fan. Normals, whose lengths are twice the areas, are
+  // yet to be rotated; so is their sum, which is returned.
+  template <class Visit>
+  Lanes visit_normals(std::size_t fan, const Visit& visit) const {
     const Lanes own = at[fans_.vertex(fan)];
     Lanes sum = {};
     fans_.visit_triangles(
         fan, [&](std::uint32_t v) { return at[v] - own; },
-        [&](Lanes a, Lanes b) { sum += twisted_cross(a, b); });
-    return rotated(sum);
+        [&](Lanes a, Lanes b) {
+          const Lanes normal = twisted_cross(a, b);
+          visit(normal);
+          sum += normal;
+        });
+    return sum;
   }
 
  private:
@@ -114,6 +128,8 @@ class WallShape {
   Lanes spacing_ = {};
   float largest_spacing_ = 0;
   float smallest_spacing_ = 0;
+  Lanes sample_ = {};  // the spacing without a sign
+  // Opposite corners of the box of the outermost samples or, if closed, of the caps.
   Lanes low_ = {};
   Lanes high_ = {};
   std::vector<std::size_t> blocks_;
