@@ -63,8 +63,10 @@ volume::AxisOrder take_orientation(std::vector<Note>& notes) {
   return *order;
 }
 
-// Changes the geometry, and what an upload with this geometry would not say.
+// Makes the volume what an upload of these samples with the other geometry would give, and a note.
 void turn(Volume& volume, const volume::AxisOrder& order) {
+  volume.id.clear();
+  volume.created.clear();
   volume.geometry = volume::reoriented(volume.dims, volume.geometry, order);
   if (const auto fault = volume::find_fault(volume.dims, volume.geometry)) {
     volume::throw_unusable("In this orientation, " + fault->message);
