@@ -391,7 +391,7 @@ TEST_F(NotesTest, AVolumeThatItsFilePlacesWronglyIsFlippedAndTurned) {
   EXPECT_EQ(daemon_.send("POST", path + "?axes=-x,y,z").status, 200);
   EXPECT_EQ(daemon_.client().reorient_volume(flipped.id, "-x,y,z").id, head.id);
   const Volume turned = daemon_.client().reorient_volume(flipped.id, "y,x,z");
-  EXPECT_THAT(turned.notes.back().detail, EndsWith("gives to y,-x,z"));
+  EXPECT_THAT(turned.notes.back().detail, EndsWith("gives to y,-x,z."));
   EXPECT_EQ(daemon_.send("POST", path + "?axes=y,-x,z").status, 200);
   // The samples are the same.
   const auto slice = [&](const std::string& id) {

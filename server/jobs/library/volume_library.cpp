@@ -47,17 +47,21 @@ std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
   return scratch.path() / "canonical";
 }
 
+// Before and after the axes.
 constexpr std::string_view kOrientation =
-    "The axes x, y, z of the samples have the directions that the file gives to ";
+    "The orientation was changed after the upload: the axes x, y, z of the samples have the "
+    "directions that the file gives to ";
+constexpr std::string_view kOrientationEnd = ".";
 
 // The order of axes that earlier changes of the orientation add up to. Removes their note.
 volume::AxisOrder take_orientation(std::vector<Note>& notes) {
   const auto note =
       std::ranges::find(notes, describe(NoteCode::kOrientationChanged).name, &Note::code);
   if (note == notes.end()) return volume::kFilesOrder;
-  const std::string_view detail = note->detail;
-  const auto order =
-      volume::parse_axis_order(detail.substr(std::min(kOrientation.size(), detail.size())));
+  std::string_view detail = note->detail;
+  detail.remove_prefix(std::min(kOrientation.size(), detail.size()));
+  detail.remove_suffix(std::min(kOrientationEnd.size(), detail.size()));
+  const auto order = volume::parse_axis_order(detail);
   if (!order) throw Error(ErrorCode::kInternal, "a note on the orientation names no axes");
   notes.erase(note);
   return *order;
@@ -74,8 +78,9 @@ void turn(Volume& volume, const volume::AxisOrder& order) {
   const volume::AxisOrder total = volume::in_turn(take_orientation(volume.notes), order);
   // A volume without these members of DICOM does not become the first one again.
   if (volume.dicom || total != volume::kFilesOrder) {
-    volume.notes.push_back(note_of(NoteCode::kOrientationChanged,
-                                   std::string(kOrientation) + volume::to_string(total)));
+    volume.notes.push_back(note_of(
+        NoteCode::kOrientationChanged,
+        std::string(kOrientation) + volume::to_string(total) + std::string(kOrientationEnd)));
   }
   if (!volume.dicom) return;
   volume.dicom->frame_of_reference_uid.clear();

@@ -15,11 +15,11 @@ export function orientation(volume: Volume): HTMLElement {
       tellError(error);
     }
   };
-  const choice = (text: string, order: string): HTMLElement => button(text, () => void change(order), { class: 'chip' });
+  const choice = (verb: string, text: string, order: string): HTMLElement => button(text, () => void change(order), { class: 'chip', 'aria-label': `${verb} ${text}` });
   return h('details.more', [
     h('summary', 'Is the volume placed wrongly?'),
     h('p.hint', 'Its file may exchange sides. A corrected copy is stored beside it, with a note.'),
-    h('p', 'Flip: ', ...['left and right', 'front and back', 'head and feet'].map((text, axis) => choice(text, flipped(volume, axis as 0)))),
-    h('p', 'Turn clockwise by 90\u00b0 in: ', ...(['axial', 'coronal', 'sagittal'] as const).map((plane) => choice(`${plane} slices`, turned(volume, plane)))),
+    h('p.presets', 'Flip: ', ...['left and right', 'front and back', 'head and feet'].map((text, axis) => choice('Flip', text, flipped(volume, axis as 0)))),
+    h('p.presets', 'Turn clockwise by 90\u00b0 in: ', ...(['axial', 'coronal', 'sagittal'] as const).map((plane) => choice('Turn in', `${plane} slices`, turned(volume, plane)))),
   ]);
 }
