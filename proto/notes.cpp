@@ -159,6 +159,11 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "chunks-missing",
      .meaning = "Some chunks of a Zarr array are missing. Their samples have the fill value.",
      .is_in_mesh = true},
+    {.code = NoteCode::kOrientationChanged,
+     .name = "orientation-changed",
+     .meaning = "Somebody flipped or turned the volume, because its file places it wrongly. The "
+                "detail says how. Positions differ from those in the file.",
+     .is_in_mesh = true},
 };
 
 }  // namespace

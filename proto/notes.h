@@ -38,6 +38,7 @@ enum class NoteCode {
   kLabelsRounded,         // labels as floats that are nearly whole; rounded
   kLabelsRenumbered,      // labels of more than 32 bits; the samples have other numbers
   kChunksMissing,         // Zarr: some chunks are not there; their samples have the fill value
+  kOrientationChanged,    // somebody flipped or turned the volume after its upload
 };
 
 struct NoteDescription {

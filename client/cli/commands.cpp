@@ -234,6 +234,13 @@ int rename(Client& client, const Options& options) {
   return kDone;
 }
 
+int reorient(Client& client, const Options& options) {
+  const Volume volume = client.reorient_volume(volume_id(client, options.id), options.axes);
+  tell_notes(volume, options, "");
+  std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
+  return kDone;
+}
+
 int ids(Client& client, const Options& options) {
   const std::vector<Candidate> all = options.added_ids != nullptr
                                          ? options.added_ids->newest(client)
@@ -258,14 +265,21 @@ struct CommandRow {
   int (*run)(Client& client, const Options& options);
 };
 
-constexpr std::array kCommands = {
-    CommandRow{Command::kEstimate, estimate}, CommandRow{Command::kSubmit, submit},
-    CommandRow{Command::kStatus, status},     CommandRow{Command::kWait, wait},
-    CommandRow{Command::kFetch, fetch},       CommandRow{Command::kCancel, cancel},
-    CommandRow{Command::kRename, rename},     CommandRow{Command::kErase, erase},
-    CommandRow{Command::kList, list},         CommandRow{Command::kInfo, info},
-    CommandRow{Command::kLabels, labels},     CommandRow{Command::kWalls, walls},
-    CommandRow{Command::kReport, report},     CommandRow{Command::kIds, ids}};
+constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
+                                  CommandRow{Command::kSubmit, submit},
+                                  CommandRow{Command::kStatus, status},
+                                  CommandRow{Command::kWait, wait},
+                                  CommandRow{Command::kFetch, fetch},
+                                  CommandRow{Command::kCancel, cancel},
+                                  CommandRow{Command::kRename, rename},
+                                  CommandRow{Command::kErase, erase},
+                                  CommandRow{Command::kReorient, reorient},
+                                  CommandRow{Command::kList, list},
+                                  CommandRow{Command::kInfo, info},
+                                  CommandRow{Command::kLabels, labels},
+                                  CommandRow{Command::kWalls, walls},
+                                  CommandRow{Command::kReport, report},
+                                  CommandRow{Command::kIds, ids}};
 
 int dispatch(const Options& options, const std::stop_token& stop) {
   if (options.command == Command::kMesh) return mesh(options, stop);

@@ -65,6 +65,9 @@ constexpr std::array kExamples = {
     Examples{"rename", R"(
   isomesh rename 3f2a91c0 "CT of the knee"
 )"},
+    Examples{"reorient", R"(
+  isomesh reorient 3f2a91c0 --axes=-x,y,z
+)"},
     Examples{"erase", R"(
   isomesh erase 3f2a91c0 77b01d2e
   isomesh erase --with-jobs 3f2a91c0

@@ -155,6 +155,16 @@ class Parser {
     add_id(rename, options_, "VOLUME");
     rename.add_option("NAME", options_.name, "The new name; \"\" removes the name")->required();
 
+    CLI::App& reorient = command(Command::kReorient, "reorient",
+                                 "Store a flipped or turned copy of a volume, and print its id");
+    add_id(reorient, options_, "VOLUME");
+    reorient
+        .add_option("--axes", options_.axes,
+                    "The axes whose directions x, y and z get. -x,y,z flips the volume along x; "
+                    "y,-x,z turns it by 90 degrees about z")
+        ->type_name("AXES")
+        ->required();
+
     CLI::App& erase =
         command(Command::kErase, "erase", "Delete volumes, or jobs and their meshes, for good");
     erase

@@ -23,6 +23,7 @@ enum class Command {
   kFetch,
   kCancel,
   kRename,
+  kReorient,
   kErase,
   kList,
   kInfo,
@@ -69,6 +70,7 @@ struct Options {
   std::string cursor;                        // list
   bool volumes = false;                      // list
   std::string name;                          // rename
+  std::string axes;                          // reorient
   std::vector<std::string> ids;              // erase
   bool are_jobs = false;                     // erase: `ids` are of jobs
   bool with_jobs = false;                    // erase: also the ended jobs on the volumes

@@ -237,6 +237,12 @@ Volume Client::rename_volume(const std::string& id, const std::optional<std::str
                                        .body = volume_name_to_json(name)}));
 }
 
+Volume Client::reorient_volume(const std::string& id, const std::string& axes) {
+  return volume_from_json(
+      impl_->send({.method = "POST",
+                   .target = volume_path(id) + "/reoriented" + query_string({{"axes", axes}})}));
+}
+
 void Client::erase_volume(const std::string& id, bool with_jobs) {
   const std::string query = with_jobs ? query_string({{"jobs", "erase"}}) : "";
   const HttpResponse response =

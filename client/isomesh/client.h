@@ -162,6 +162,9 @@ class Client {
   std::vector<Volume> volumes();
   // Renames the volume, or removes its name.
   Volume rename_volume(const std::string& id, const std::optional<std::string>& name);
+  // Stores a flipped or turned copy of the volume. `axes` are those whose directions x, y and z
+  // get: "-x,y,z" flips along x, "y,-x,z" turns by 90 degrees about z.
+  Volume reorient_volume(const std::string& id, const std::string& axes);
   // Also erases the ended jobs on the volume if `with_jobs` is true.
   void erase_volume(const std::string& id, bool with_jobs = false);
   Histogram histogram(const std::string& id, std::uint32_t bins = 256);

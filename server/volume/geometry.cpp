@@ -4,7 +4,10 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/text.h"
@@ -17,6 +20,7 @@ namespace {
 // lattice below this.
 constexpr double kFlattestDeterminant = 0.01;
 constexpr double kUnitTolerance = 1e-3;
+constexpr std::string_view kAxes = "xyz";
 // Bounds on a spacing in millimetres; they include electron microscopy and geology. Beyond them
 // areas and volumes overflow or underflow.
 constexpr double kFinestSpacing = 1e-6;
@@ -94,6 +98,16 @@ std::optional<FieldError> resolution_fault(const std::array<std::uint32_t, 3>& d
                                   "precision; a spacing must be at least 1/65536 of that"};
 }
 
+bool is_perpendicular(const Geometry& geometry) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3 one = column(geometry.direction, axis);
+    const Vector3 next = column(geometry.direction, (axis + 1) % 3);
+    const double cosine = std::inner_product(one.begin(), one.end(), next.begin(), 0.0);
+    if (std::abs(cosine) > kUnitTolerance) return false;
+  }
+  return true;
+}
+
 // Checks the sizes of a request, as volume_dims does for a file.
 void check_dims(const RawDescription& description) {
   const std::array<std::uint64_t, 3> sizes = {description.dims[0], description.dims[1],
@@ -143,6 +157,67 @@ Geometry normalised(const Geometry& geometry) {
   std::for_each(result.spacing.begin(), result.spacing.end(), drop_sign_of_zero);
   std::for_each(result.direction.begin(), result.direction.end(), drop_sign_of_zero);
   return result;
+}
+
+AxisOrder in_turn(const AxisOrder& first, const AxisOrder& second) {
+  AxisOrder both = {};
+  std::ranges::transform(second, both.begin(), [&](int axis) {
+    const int before = first[static_cast<std::size_t>(std::abs(axis) - 1)];
+    return axis < 0 ? -before : before;
+  });
+  return both;
+}
+
+std::optional<AxisOrder> parse_axis_order(std::string_view text) {
+  const std::vector<std::string_view> names = split(text, ',');
+  AxisOrder order = {};
+  if (names.size() != order.size()) return std::nullopt;
+  std::set<int> axes;
+  for (std::size_t at = 0; at < order.size(); ++at) {
+    const bool is_reversed = names[at].starts_with('-');
+    const std::string_view name = names[at].substr(is_reversed ? 1 : 0);
+    const std::size_t axis = kAxes.find(name);
+    if (name.size() != 1 || axis == std::string_view::npos) return std::nullopt;
+    order[at] = static_cast<int>(axis + 1) * (is_reversed ? -1 : 1);
+    axes.insert(std::abs(order[at]));
+  }
+  return axes.size() == order.size() ? std::optional(order) : std::nullopt;
+}
+
+std::string to_string(const AxisOrder& order) {
+  std::string text;
+  for (const int axis : order) {
+    if (!text.empty()) text += ',';
+    if (axis < 0) text += '-';
+    text += kAxes[static_cast<std::size_t>(std::abs(axis) - 1)];
+  }
+  return text;
+}
+
+Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
+                    const AxisOrder& order) {
+  Geometry result = geometry;
+  bool is_turned = false;
+  for (std::size_t axis = 0; axis < order.size(); ++axis) {
+    const auto from = static_cast<std::size_t>(std::abs(order[axis]) - 1);
+    is_turned = is_turned || from != axis;
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double part = geometry.direction[row * 3 + from];
+      result.direction[row * 3 + axis] = order[axis] < 0 ? -part : part;
+    }
+  }
+  if (is_turned && !is_perpendicular(geometry)) {
+    throw_unusable(
+        "The axes of this volume are not perpendicular, so it can be flipped, but not turned");
+  }
+  for (std::size_t axis = 0; axis < order.size(); ++axis) {
+    const Vector3 before = step_of(geometry, static_cast<int>(axis));
+    const Vector3 after = step_of(result, static_cast<int>(axis));
+    for (std::size_t row = 0; row < 3; ++row) {
+      result.origin[row] += (before[row] - after[row]) * (dims[axis] - 1.0) / 2;
+    }
+  }
+  return normalised(result);
 }
 
 std::optional<FieldError> find_fault(const std::array<std::uint32_t, 3>& dims,

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "proto/error.h"
 #include "proto/types.h"
@@ -29,6 +30,24 @@ Vector3 step_of(const Geometry& geometry, int axis);
 // The same lattice with unit direction vectors: the lengths of columns that deviate from 1 by more
 // than 1e-3 move to the spacing; all others stay exact. No number is -0.
 Geometry normalised(const Geometry& geometry);
+
+// The present axes, from 1 to 3, whose directions the axes i, j and k get; a negative number stands
+// for the opposite direction. Each axis occurs once.
+using AxisOrder = std::array<int, 3>;
+inline constexpr AxisOrder kFilesOrder = {1, 2, 3};  // changes nothing
+
+// The order that has the effect of one, and then another.
+AxisOrder in_turn(const AxisOrder& first, const AxisOrder& second);
+
+// Axes as text: "-x,y,z". parse_axis_order returns nothing for any other text.
+std::optional<AxisOrder> parse_axis_order(std::string_view text);
+std::string to_string(const AxisOrder& order);
+
+// The lattice flipped or turned about its centre; samples and spacings stay with their axes. Throws
+// Error kUnusableVolume if an axis gets the direction of another one and they are not
+// perpendicular: distances in the volume would change.
+Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
+                    const AxisOrder& order);
 
 // The first reason why a geometry is unusable, or empty. Reasons are: numbers that are not finite;
 // spacings that are not positive; direction columns that are not unit vectors (to 1e-3) or nearly

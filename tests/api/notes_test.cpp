@@ -30,6 +30,7 @@ using import::test::siemens_mosaic;
 using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -155,6 +156,7 @@ Files structures_and_images() {
 struct Shown {
   Files files;
   std::vector<std::string> options = {};
+  std::string axes = {};  // of a change of the orientation after the upload
 };
 
 std::string nearly_whole() {
@@ -223,6 +225,7 @@ const std::map<std::string, Shown>& shown() {
          {"1", slice_at(1, "0\\0\\1.2")},
          {"2", slice_at(2, "0\\0\\2.5")},
          {"3", slice_at(3, "0\\0\\3.8")}}}},
+      {"orientation-changed", {{{"a.nrrd", nrrd("")}}, {}, "y,-x,z"}},
       {"frame-of-reference",
        {{{"1", slice(1, "1.9.1")}, {"2", slice(2, "1.9.2")}, {"3", slice(3, "1.9.3")}}}},
   };
@@ -239,9 +242,12 @@ class NotesTest : public testing::Test {
       write_file(folder_ / folder / name, bytes);
     }
     const auto path = folder_ / folder;
-    return daemon_.command(
+    const Finished uploaded = daemon_.command(
         with({"--json", "upload", what.files.size() == 1 ? path / what.files.begin()->first : path},
              what.options));
+    if (what.axes.empty()) return uploaded;
+    const std::string id = volume_from_json(uploaded.output).id;
+    return daemon_.command({"--json", "reorient", id, "--axes=" + what.axes});
   }
 
   const Daemon daemon_;
@@ -371,6 +377,40 @@ TEST_F(NotesTest, EveryVolumeOfAFolderIsAnsweredFor) {
                           folder_ / "a.stl"})
                 .status,
             0);
+}
+
+TEST_F(NotesTest, AVolumeThatItsFilePlacesWronglyIsFlippedAndTurned) {
+  const Volume head = volume_from_json(upload_files({{{"a.nrrd", nrrd("")}}}, "head").output);
+  const std::string path = "/v1/volumes/" + head.id + "/reoriented";
+  for (const std::string axes : {"", "?axes=", "?axes=x,y,z", "?axes=x,y", "?axes=x,x,y"}) {
+    EXPECT_EQ(daemon_.send("POST", path + axes).status, 400) << axes;
+  }
+  const Volume flipped = daemon_.client().reorient_volume(head.id, "-x,y,z");
+  EXPECT_EQ(flipped.geometry.direction[0], -1);
+  EXPECT_EQ(flipped.geometry.origin[0], flipped.dims[0] - 1.0);
+  EXPECT_EQ(daemon_.send("POST", path + "?axes=-x,y,z").status, 200);
+  EXPECT_EQ(daemon_.client().reorient_volume(flipped.id, "-x,y,z").id, head.id);
+  const Volume turned = daemon_.client().reorient_volume(flipped.id, "y,x,z");
+  EXPECT_THAT(turned.notes.back().detail, EndsWith("gives to y,-x,z."));
+  EXPECT_EQ(daemon_.send("POST", path + "?axes=y,-x,z").status, 200);
+  // The samples are the same.
+  const auto slice = [&](const std::string& id) {
+    return daemon_.send("GET", "/v1/volumes/" + id + "/slice").body;
+  };
+  EXPECT_EQ(slice(flipped.id), slice(head.id));
+}
+
+TEST_F(NotesTest, AFlippedDicomVolumeKeepsItsPatientButNotItsFrame) {
+  const Volume ct = volume_from_json(
+      upload_files({{{"1", slice(1, "1.9")}, {"2", slice(2, "1.9")}}}, "ct").output);
+  ASSERT_TRUE(ct.dicom);
+  EXPECT_EQ(ct.dicom->frame_of_reference_uid, "1.9");
+  const Volume flipped = daemon_.client().reorient_volume(ct.id, "x,y,-z");
+  ASSERT_TRUE(flipped.dicom);
+  EXPECT_EQ(flipped.dicom->study_uid, ct.dicom->study_uid);
+  EXPECT_EQ(flipped.dicom->frame_of_reference_uid, "");
+  EXPECT_TRUE(flipped.dicom->instances.empty());
+  EXPECT_FALSE(ct.dicom->instances.empty());
 }
 
 TEST_F(NotesTest, AVolumeKeepsItsFilesNameUntilItIsRenamed) {

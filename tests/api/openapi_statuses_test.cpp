@@ -31,10 +31,12 @@ class Statuses {
   explicit Statuses(const Daemon& daemon) : daemon_(daemon) {}
 
   // The request is the operation's; its target begins with the path, ids filled in.
-  void probe(const std::string& operation, const std::string& target, const std::string& body = {},
-             const Headers& headers = {}) {
+  Answer probe(const std::string& operation, const std::string& target,
+               const std::string& body = {}, const Headers& headers = {}) {
     const std::string method = operation.substr(0, operation.find(' '));
-    seen_[operation].insert(daemon_.send(method, target, body, headers).status);
+    Answer answer = daemon_.send(method, target, body, headers);
+    seen_[operation].insert(answer.status);
+    return answer;
   }
   void see(const std::string& operation, const std::string& bytes) {
     seen_[operation].insert(answer_to(daemon_.url(), bytes).status);
@@ -116,6 +118,16 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.probe(rename, "/v1/volumes/0123", name);
   statuses.probe(rename, "/v1/volumes/" + id, name, {{"If-Match", "\"x\""}});
   statuses.probe_bodies(rename, "/v1/volumes/" + id);
+  const std::string reorient = "POST /v1/volumes/{id}/reoriented";
+  const std::string turned = "/v1/volumes/" + id + "/reoriented?axes=y,-x,z";
+  statuses.probe(reorient, turned);
+  statuses.probe(reorient, turned);
+  statuses.probe(reorient, "/v1/volumes/" + id + "/reoriented");
+  statuses.probe(reorient, "/v1/volumes/0123/reoriented?axes=-x,y,z");
+  const std::string sheared = "?dims=2,2,2&type=uint8&direction=1,0,0,0,1,0.6,0,0,0.8";
+  const Volume other =
+      volume_from_json(statuses.probe(post, "/v1/volumes" + sheared, "12345678").body);
+  statuses.probe(reorient, "/v1/volumes/" + other.id + "/reoriented?axes=y,-x,z");
   const std::string erase = "DELETE /v1/volumes/{id}";
   statuses.probe(erase, "/v1/volumes/" + running.parameters.volume);
   statuses.probe(erase, "/v1/volumes/" + id + "?x=1");

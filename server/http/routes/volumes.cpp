@@ -6,6 +6,7 @@
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/http/routes/uploads.h"
+#include "server/volume/geometry.h"
 #include "server/volume/names.h"
 
 namespace isomesh::http {
@@ -162,6 +163,21 @@ void rename(App& app, const Request& request, Response& response) {
   answer_json(response, 200, to_json(app.services.library.rename(owner_of(request), id, name)));
 }
 
+void reorient(App& app, const Request& request, Response& response) {
+  check_known(request, {"axes"});
+  const auto order = volume::parse_axis_order(request.parameter("axes"));
+  if (!order || *order == volume::kFilesOrder) {
+    throw invalid_parameter("axes",
+                            "must be x, y and z, each with a minus or without, in any "
+                            "order but x,y,z, such as -x,y,z");
+  }
+  const auto place = place_for_upload(app, request);
+  const auto [volume, is_new] =
+      app.services.library.reorient(owner_of(request), request.path_parameter("id"), *order);
+  response.set_header("Location", kVolumes + '/' + volume.id);
+  answer_json(response, is_new ? 201 : 200, to_json(volume));
+}
+
 store::Made what_was_made_of(const Request& request) {
   const std::string_view jobs = request.has_parameter("jobs") ? request.parameter("jobs") : "keep";
   if (jobs != "keep" && jobs != "erase") {
@@ -215,6 +231,8 @@ void add_volume_routes(App& app) {
           [&app](const auto& request, auto& response) { get(app, request, response); });
   add_patch(app, kVolumes + "/{id}",
             [&app](const auto& request, auto& response) { rename(app, request, response); });
+  add_post(app, kVolumes + "/{id}/reoriented",
+           [&app](const auto& request, auto& response) { reorient(app, request, response); });
   add_delete(app, kVolumes + "/{id}",
              [&app](const auto& request, auto& response) { erase(app, request, response); });
 }

@@ -1,10 +1,18 @@
 #include "server/jobs/library/volume_library.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <string_view>
+
 #include "base/clock.h"
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/jobs/library/intact_volume.h"
+#include "server/volume/canonical.h"
+#include "server/volume/unusable.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -37,6 +45,65 @@ UploadName name_of_member(const UploadName& name, const std::string& member) {
 
 std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
   return scratch.path() / "canonical";
+}
+
+// Before and after the axes.
+constexpr std::string_view kOrientation =
+    "The orientation was changed after the upload: the axes x, y, z of the samples have the "
+    "directions that the file gives to ";
+constexpr std::string_view kOrientationEnd = ".";
+
+// The order of axes that earlier changes of the orientation add up to. Removes their note.
+volume::AxisOrder take_orientation(std::vector<Note>& notes) {
+  const auto note =
+      std::ranges::find(notes, describe(NoteCode::kOrientationChanged).name, &Note::code);
+  if (note == notes.end()) return volume::kFilesOrder;
+  std::string_view detail = note->detail;
+  detail.remove_prefix(std::min(kOrientation.size(), detail.size()));
+  detail.remove_suffix(std::min(kOrientationEnd.size(), detail.size()));
+  const auto order = volume::parse_axis_order(detail);
+  if (!order) throw Error(ErrorCode::kInternal, "a note on the orientation names no axes");
+  notes.erase(note);
+  return *order;
+}
+
+// Makes the volume what an upload of these samples with the other geometry would give, and a note.
+void turn(Volume& volume, const volume::AxisOrder& order) {
+  volume.id.clear();
+  volume.created.clear();
+  volume.geometry = volume::reoriented(volume.dims, volume.geometry, order);
+  if (const auto fault = volume::find_fault(volume.dims, volume.geometry)) {
+    volume::throw_unusable("In this orientation, " + fault->message);
+  }
+  const volume::AxisOrder total = volume::in_turn(take_orientation(volume.notes), order);
+  // A volume without these members of DICOM does not become the first one again.
+  if (volume.dicom || total != volume::kFilesOrder) {
+    volume.notes.push_back(note_of(
+        NoteCode::kOrientationChanged,
+        std::string(kOrientation) + volume::to_string(total) + std::string(kOrientationEnd)));
+  }
+  if (!volume.dicom) return;
+  volume.dicom->frame_of_reference_uid.clear();
+  volume.dicom->position_reference_indicator.clear();
+  volume.dicom->instances.clear();
+}
+
+// Writes a canonical file of the same samples with another geometry.
+void copy_samples(const volume::CanonicalFile& from, const Geometry& geometry,
+                  const std::filesystem::path& path, const std::stop_token& stop) {
+  constexpr std::size_t kCopiedAtOnce = std::size_t{4} << 20;
+  volume::CanonicalHeader header = from.header();
+  header.geometry = geometry;
+  volume::CanonicalWriter writer(path, header);
+  std::span<std::byte> rest = writer.samples();
+  std::uint64_t offset = 0;
+  while (!rest.empty()) {
+    if (stop.stop_requested()) throw_cancelled();
+    const std::span<std::byte> piece = rest.first(std::min(kCopiedAtOnce, rest.size()));
+    from.read(offset, piece);
+    offset += piece.size();
+    rest = rest.subspan(piece.size());
+  }
 }
 
 }  // namespace
@@ -111,6 +178,18 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   stored.format = std::move(volume.format);
   stored.ignored = std::move(volume.ignored);
   return {std::move(stored), is_new};
+}
+
+std::pair<Volume, bool> VolumeLibrary::reorient(const std::string& owner, const std::string& id,
+                                                const volume::AxisOrder& order) {
+  Volume volume = volumes_.get(owner, id);
+  turn(volume, order);
+  const store::ScratchFolder scratch(folder_.scratch());
+  runner_.until_stopped({}, [&](const std::stop_token& stop) {
+    const store::LocalBlob samples = intact_volume(blobs_, volume.samples, stop);
+    copy_samples(volume::CanonicalFile(samples.path), volume.geometry, canonical_in(scratch), stop);
+  });
+  return keep(owner, std::move(volume), scratch, {});
 }
 
 std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,

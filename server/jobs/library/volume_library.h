@@ -17,6 +17,7 @@
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
 #include "server/store/volume_store.h"
+#include "server/volume/geometry.h"
 
 namespace isomesh::jobs {
 
@@ -72,6 +73,14 @@ class VolumeLibrary {
                 const std::optional<std::string>& name) {
     return volumes_.rename(owner, id, name);
   }
+
+  // Stores a flipped or turned copy of the owner's volume, as volume::reoriented makes it, with a
+  // note on all changes since its upload. The copy of a DICOM volume refers neither to the images
+  // nor to their frame of reference: its positions are others. Second: false if the owner already
+  // had it. Throws Error kNotFound, kGone, kOutOfSpace; kUnusableVolume if the volume is damaged or
+  // cannot be turned; and as ImportRunner::until_stopped does.
+  std::pair<Volume, bool> reorient(const std::string& owner, const std::string& id,
+                                   const volume::AxisOrder& order);
 
   // Aborts running and waiting imports and the storing of their bytes, and rejects further ones.
   void stop_imports() { runner_.stop(); }

@@ -52,6 +52,37 @@ TEST(Geometry, OfAStepWithoutALengthIsRefusedByItsSpacing) {
   EXPECT_NE(fault->message.find("along i is 0 mm"), std::string::npos) << fault->message;
 }
 
+TEST(Geometry, IsFlippedAndTurnedAboutItsCentre) {
+  const std::array<std::uint32_t, 3> dims = {3, 5, 2};
+  const Geometry before = geometry_of({10, 20, 30}, {{{1, 0, 0}, {0, 2, 0}, {0, 0, 4}}});
+  const Geometry flipped = reoriented(dims, before, {-1, 2, 3});
+  EXPECT_EQ(flipped.origin, (Vector3{12, 20, 30}));
+  EXPECT_EQ(step_of(flipped, 0), (Vector3{-1, 0, 0}));
+  EXPECT_EQ(step_of(flipped, 1), step_of(before, 1));
+  EXPECT_EQ(reoriented(dims, flipped, {-1, 2, 3}), before);
+  const Geometry turned = reoriented(dims, before, {2, -1, 3});
+  EXPECT_EQ(turned.spacing, before.spacing);
+  EXPECT_EQ(step_of(turned, 0), (Vector3{0, 1, 0}));
+  EXPECT_EQ(step_of(turned, 1), (Vector3{-2, 0, 0}));
+  // The centre (11, 24, 32), less a step along i and two along j.
+  EXPECT_EQ(turned.origin, (Vector3{15, 23, 30}));
+}
+
+TEST(Geometry, OfShearedAxesIsFlippedButNotTurned) {
+  const Geometry sheared = geometry_of({0, 0, 0}, {{{1, 0, 0}, {0, 1, 0}, {0, 0.3, 2}}});
+  EXPECT_EQ(step_of(reoriented(kDims, sheared, {1, 2, -3}), 2), (Vector3{0, -0.3, -2}));
+  EXPECT_THROW(reoriented(kDims, sheared, {1, 3, 2}), Error);
+}
+
+TEST(Geometry, OrderOfAxesIsText) {
+  EXPECT_EQ(parse_axis_order("y,-x,z"), (AxisOrder{2, -1, 3}));
+  EXPECT_EQ(to_string(AxisOrder{2, -1, 3}), "y,-x,z");
+  for (const char* wrong :
+       {"", "x,y", "x,x,z", "x,-x,z", "x,y,z,x", "x,y,w", "--x,y,z", "xy,y,z"}) {
+    EXPECT_FALSE(parse_axis_order(wrong)) << wrong;
+  }
+}
+
 TEST(Geometry, IsRefusedWhereSinglePrecisionEnds) {
   EXPECT_EQ(faulty_field({.origin = {65000, 0, 0}}), "");
   EXPECT_EQ(faulty_field({.origin = {66000, 0, 0}}), "origin");

@@ -189,6 +189,32 @@ describe('a NIfTI file with two forms', () => {
   });
 });
 
+describe('a volume that its file places wrongly', () => {
+  it('is flipped and turned as a copy with a note, and back again', async ({ daemon, page }) => {
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'flat.nrrd', bytes: smallNrrd() }]);
+    await page.waitForURL(volumePage);
+    const idOf = (): string => volumePage.exec(page.url())?.[0].split('/').pop() ?? '';
+    const first = idOf();
+    const change = async (name: string): Promise<{ direction: number[] }> => {
+      const before = idOf();
+      await page.getByText('Is the volume placed wrongly?').click();
+      await page.getByRole('button', { name }).click();
+      await page.waitForURL((url) => volumePage.test(url.hash) && !url.hash.includes(before));
+      return daemon.json(`/v1/volumes/${idOf()}`);
+    };
+    const flipped = await change('Flip left and right');
+    expect(flipped.direction).toEqual([-1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const note = page.locator('[data-note="orientation-changed"]');
+    await expect.poll(() => note.innerText()).toContain('-x,y,z');
+    await change('Flip left and right');
+    expect(idOf()).toBe(first);
+    await expect.poll(() => note.count()).toBe(0);
+    expect((await change('Turn in axial slices')).direction).toEqual([0, -1, 0, 1, 0, 0, 0, 0, 1]);
+    await expect.poll(() => note.innerText()).toContain('y,-x,z');
+  });
+});
+
 describe('iso-values with names', () => {
   it('are there for what a person says is a CT, beside a person\'s own', async ({ daemon, page }) => {
     await page.goto(daemon.url);

@@ -1,6 +1,10 @@
 // The form of a job's parameters, and what of it reaches the job.
-import { execFileSync } from 'node:child_process';
+import { execFile, execFileSync } from 'node:child_process';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { promisify } from 'node:util';
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { parameters } from '../../../client/web/src/job/table';
@@ -125,6 +129,33 @@ describe('the form', () => {
     for (const { name, option } of parameters.filter((parameter) => names.includes(parameter.name))) {
       expect(said, name).toMatch(new RegExp(`--(no-)?${option}\\b`));
       expect(help, name).toMatch(new RegExp(`--${option}\\b`));
+    }
+  });
+});
+
+describe('the text that repeats a job', () => {
+  it('runs as Python and as JavaScript, and gives the same mesh', async ({ daemon, page }) => {
+    const { id } = await daemon.make({ volume: ball, iso: 100, lambda: 0.5, close: true, crop: null, formats: ['stl'] });
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    const said = async (name: string): Promise<string> => (await page.locator('.snippet', { has: page.locator('summary', { hasText: name }) }).locator('pre').textContent()) ?? '';
+    const mesh = Buffer.from(await (await fetch(`${daemon.url}/v1/jobs/${id}/mesh.stl`)).arrayBuffer());
+    const folder = mkdtempSync(join(tmpdir(), 'isomesh-repeat-'));
+    const repeated = async (program: string, file: string, text: string, env: NodeJS.ProcessEnv): Promise<void> => {
+      writeFileSync(join(folder, file), text);
+      await promisify(execFile)(program, [file], { cwd: folder, env: { ...process.env, ...env } });
+      expect(readFileSync(join(folder, 'mesh.stl')).equals(mesh), file).toBe(true);
+      rmSync(join(folder, 'mesh.stl'));
+    };
+    try {
+      await repeated('python3', 'repeat.py', await said('Python'), { PYTHONPATH: fileURLToPath(new URL('../../../client/python/src', import.meta.url)) });
+      const own = join(folder, 'node_modules/isomesh');
+      mkdirSync(own, { recursive: true });
+      writeFileSync(join(own, 'package.json'), '{"type":"module","exports":"./client.js"}');
+      writeFileSync(join(own, 'client.js'), await (await fetch(`${daemon.url}/client.js`)).text());
+      await repeated(process.execPath, 'repeat.mjs', await said('JavaScript'), {});
+    } finally {
+      rmSync(folder, { recursive: true });
     }
   });
 });

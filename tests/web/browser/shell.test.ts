@@ -26,11 +26,24 @@ describe('the page', () => {
     expect(new Set(titles).size).toBe(titles.length);
     expect(titles[2]).toContain('Surface at 100');
     await page.goto(`${daemon.url}/#/jobs/gone`);
-    await expect.poll(() => page.locator('.page-problem').count()).toBe(1);
+    await expect.poll(() => page.locator('.page-problem').innerText()).toContain('The address is wrong');
     await expect.poll(() => page.locator('main h1').count()).toBe(1);
     await page.goto(`${daemon.url}/#/compare`);
     await page.getByRole('link', { name: 'Go to the list of jobs' }).click();
     await page.waitForURL(/#\/jobs$/);
+  });
+
+  it('is light on paper, and without what one presses', async ({ page, daemon }) => {
+    await page.emulateMedia({ colorScheme: 'dark', media: 'print' });
+    for (const place of ['', `volumes/${ball}`, `jobs/${job}`, 'jobs']) {
+      await page.goto(`${daemon.url}/#/${place}`);
+      await expect.poll(() => page.locator('main h1').count()).toBe(1);
+      await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
+      expect(await page.locator('.top').isVisible(), place).toBe(false);
+      expect(await page.locator('button:visible').count(), place).toBe(0);
+      expect(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), place).toBe('rgb(243, 245, 246)');
+    }
+    await page.emulateMedia({ colorScheme: null, media: null });
   });
 
   it('keeps the view that was opened last, however late the one before is', async ({ page, daemon }) => {

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '@/api/types';
-import { cursorOfText, patientAxes, placedAt, sampleAt, sideOf, slicePlacement, slicePlane, toPatient, toSamples, type Placement } from '@/volume/geometry';
+import { axisDirection, cursorOfText, flipped, patientAxes, placedAt, sampleAt, sideOf, slicePlacement, slicePlane, toPatient, toSamples, turned, type Placement } from '@/volume/geometry';
 
 const identity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 // Columns: x towards the right, y towards the front, z up, as NIfTI templates lie.
@@ -19,6 +19,23 @@ describe('geometry', () => {
       expect([right.begin, right.end, down.begin, down.end].join('')).toBe('RLAP');
       const coronal = slicePlane({ direction }, 'coronal');
       expect([coronal.right.begin, coronal.down.begin, coronal.down.end].join('')).toBe('RSI');
+    }
+  });
+
+  it('flips and turns what a slice shows, whichever way the samples run', () => {
+    for (const direction of [identity, template, sagittal]) {
+      const corrected = (order: string): { direction: number[] } => {
+        const columns = order.split(',').map((name) => axisDirection({ direction }, 'xyz'.indexOf(name.slice(-1))).map((part) => (name.startsWith('-') ? -part : part)));
+        return { direction: [0, 1, 2].flatMap((row) => columns.map((column) => column[row] as number)) };
+      };
+      // Where the end of an axis comes to lie, by the side where it lay.
+      const moved = (order: string): string[] => [0, 1, 2].map((axis) => sideOf(axisDirection({ direction }, axis)) + sideOf(axisDirection(corrected(order), axis)));
+      for (const pair of moved(flipped({ direction }, 0))) expect('LR RL AA PP SS II').toContain(pair);
+      for (const pair of moved(flipped({ direction }, 2))) expect('LL RR AA PP SI IS').toContain(pair);
+      // Clockwise, as a radiologist sees the patient from the feet: from the left to the back, and on to the right.
+      for (const pair of moved(turned({ direction }, 'axial'))) expect('LP PR RA AL SS II').toContain(pair);
+      for (const pair of moved(turned({ direction }, 'coronal'))) expect('LI IR RS SL AA PP').toContain(pair);
+      for (const pair of moved(turned({ direction }, 'sagittal'))) expect('PI IA AS SP LL RR').toContain(pair);
     }
   });
 

@@ -199,6 +199,12 @@ class Client(Batches):
         renamed = self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}, answers.VOLUME)
         return cast("api.Volume", renamed)
 
+    def reorient(self, volume: Union[str, api.Volume], axes: str) -> api.Volume:
+        """Stores a flipped or turned copy of a volume that its file places wrongly. `axes` are those whose directions
+        x, y and z get: "-x,y,z" flips along x, "y,-x,z" turns by 90 degrees about z."""
+        path = _volume_path(volume) + "/reoriented?" + urlencode({"axes": axes})
+        return cast("api.Volume", self._exchange.send_json("POST", path, None, answers.VOLUME))
+
     def erase(self, volume: Union[str, api.Volume], *, jobs: bool = False) -> None:
         """Deletes a volume from the server, with `jobs` also the ended jobs on it and their meshes."""
         self._exchange.delete(_volume_path(volume) + ("?jobs=erase" if jobs else ""))

@@ -103,6 +103,14 @@ export class Client {
     });
   }
 
+  /**
+   * Stores a flipped or turned copy of the volume. `axes` are those whose directions x, y and z get: `-x,y,z` flips
+   * along x, `y,-x,z` turns by 90 degrees about z.
+   */
+  reorientVolume(id: string, axes: string): Promise<Volume> {
+    return this.connection.json(`${volumePath(id)}/reoriented${queryOf({ axes })}`, { method: 'POST' });
+  }
+
   /** Erases the volume, and with `jobs: 'erase'` all jobs on it with their files. */
   async eraseVolume(id: string, { jobs }: { jobs?: 'keep' | 'erase' } = {}): Promise<void> {
     await this.connection.send(`${volumePath(id)}${queryOf({ jobs })}`, { method: 'DELETE' });

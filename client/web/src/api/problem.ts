@@ -112,7 +112,7 @@ export function asApiError(error: unknown, server = ''): ApiError {
 const advice: readonly [statuses: number[], text: string][] = [
   [[0], 'Try again when the server responds.'],
   [[401, 403], 'Enter an access token that has this permission.'],
-  [[404, 410], 'It may have been erased. Choose another one from the list.'],
+  [[404, 410], 'The address is wrong, or what was there is not kept any more. Choose another one from the list.'],
   [[413], 'Crop or resample the volume, or ask the administrator to raise the limit.'],
   [[415], 'Send the volume in a format that the server reads. Raw samples need a description.'],
   [[422], 'Export the volume again from its source, or choose another one.'],

@@ -1,5 +1,6 @@
 // Decodes Draco streams beside the page, or takes plain arrays, and makes blocks of them.
-import create, { type DracoAttribute, type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
+import type { Attribute, DecoderModule } from 'draco3d';
+import create from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
 import wasmUrl from 'three/examples/jsm/libs/draco/gltf/draco_decoder.wasm?url';
 import { prepare, split, type Block, type Triangles } from './blocks';
 import type { PlainArrays } from './glb';
@@ -33,7 +34,7 @@ const ready = fetch(wasmUrl)
   })
   .then((wasmBinary) => create({ wasmBinary }));
 
-function copyOut<T>(draco: DracoModule, bytes: number, read: (pointer: number) => T): T {
+function copyOut<T>(draco: DecoderModule, bytes: number, read: (pointer: number) => T): T {
   const pointer = draco._malloc(bytes);
   try {
     return read(pointer);
@@ -42,34 +43,33 @@ function copyOut<T>(draco: DracoModule, bytes: number, read: (pointer: number) =
   }
 }
 
-function decode(draco: DracoModule, { bytes, positionId, distanceId }: DecodeRequest): Triangles {
+function decode(draco: DecoderModule, { bytes, positionId, distanceId }: DecodeRequest): Triangles {
   const decoder = new draco.Decoder();
   const buffer = new draco.DecoderBuffer();
   const mesh = new draco.Mesh();
   try {
-    buffer.Init(bytes, bytes.length);
+    buffer.Init(new Int8Array(bytes.buffer, bytes.byteOffset, bytes.length), bytes.length);
     const status = decoder.DecodeBufferToMesh(buffer, mesh);
     if (!status.ok() || mesh.ptr === 0) throw new Error(`Draco: ${status.error_msg()}`);
     const attribute =
       positionId === null
         ? decoder.GetAttribute(mesh, decoder.GetAttributeId(mesh, draco.POSITION))
         : decoder.GetAttributeByUniqueId(mesh, positionId);
-    if (attribute.ptr === 0) throw new Error('Draco: the stream holds no positions');
     const corners = 3 * mesh.num_faces();
-    const floatsOf = (one: DracoAttribute, count: number): Float32Array<ArrayBuffer> =>
-      copyOut(draco, 4 * count, (pointer) => {
+    const floatsOf = (one: Attribute, count: number): Float32Array<ArrayBuffer> => {
+      if ((one as Attribute & { ptr: number }).ptr === 0) throw new Error('Draco: the stream lacks positions or distances');
+      return copyOut(draco, 4 * count, (pointer) => {
         decoder.GetAttributeDataArrayForAllPoints(mesh, one, draco.DT_FLOAT32, 4 * count, pointer);
         return draco.HEAPF32.slice(pointer / 4, pointer / 4 + count);
       });
+    };
     const index = copyOut(draco, 4 * corners, (pointer) => {
       decoder.GetTrianglesUInt32Array(mesh, 4 * corners, pointer);
       return draco.HEAPU32.slice(pointer / 4, pointer / 4 + corners);
     });
     const positions = floatsOf(attribute, 3 * mesh.num_points());
     if (distanceId === null) return { positions, index };
-    const distance = decoder.GetAttributeByUniqueId(mesh, distanceId);
-    if (distance.ptr === 0) throw new Error('Draco: the stream holds no distances');
-    return { positions, index, distances: floatsOf(distance, mesh.num_points()) };
+    return { positions, index, distances: floatsOf(decoder.GetAttributeByUniqueId(mesh, distanceId), mesh.num_points()) };
   } finally {
     draco.destroy(mesh);
     draco.destroy(buffer);

@@ -5,8 +5,7 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import { firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
 import { verticalAngle } from './camera';
-import { GlPainter } from './live_gl';
-import { placeOfSamples, type LivePainter, type LivePicture, type LiveScene } from './live_painter';
+import { GlPainter, placeOfSamples, type LivePicture, type LiveScene } from './live_gl';
 import type { Look } from '../volume/looks';
 import { onTap } from './tap';
 import { firstOffset, fitted, turned } from './views';
@@ -63,7 +62,7 @@ export class LiveSurface {
   private readonly costs: { moving: number; resting: number };
 
   private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
-  private readonly painter: LivePainter = new GlPainter(this.camera);
+  private readonly painter = new GlPainter(this.camera);
 
   // Throws if the browser has no WebGL 2.
   constructor(private readonly host: HTMLElement) {

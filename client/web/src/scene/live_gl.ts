@@ -11,34 +11,101 @@ import {
   LinearFilter,
   LineBasicMaterial,
   LineSegments,
+  Matrix4,
   Mesh,
   NearestFilter,
   RawShaderMaterial,
   RedFormat,
   RGFormat,
   Scene,
-  PerspectiveCamera,
+  Vector3,
+  type PerspectiveCamera,
   WebGLRenderer,
   type IUniform,
   type WebGLRenderTarget,
 } from 'three';
 import { sumsOf, type Look } from '../volume/looks';
-import type { Preview } from '../volume/preview';
+import { blockSize, type Preview } from '../volume/preview';
 import { compile } from './compile';
-import {
-  crossColour,
-  crossOf,
-  crossOpacity,
-  isSoftwareName,
-  placeOfSamples,
-  valuesOf,
-  type LivePainter,
-  type LivePicture,
-  type LiveScene,
-} from './live_painter';
-import { fragmentShader, vertexShader } from './live_shader';
-import { sceneFields } from './live_walk';
+import { fragmentShader, kinds, vertexShader } from './live_shader';
 import { Painting } from './painting';
+
+export interface LiveScene {
+  preview: Preview;
+  camera: PerspectiveCamera;
+  // What the camera looks at, in millimetres.
+  target: Vector3;
+  // In parts of the preview's window.
+  iso: number;
+  // The length of a step, in samples; a longer one may pass over what is thinner.
+  reach: number;
+  // The surface at the iso-value, a look through the samples, or labels by the look's colours.
+  kind: keyof typeof kinds;
+  look: Look | null;
+  // What of the volume is drawn, in parts of its samples along each axis; null for all of it.
+  crop: readonly [Vector3, Vector3] | null;
+  // Where the slices meet, in millimetres; lines through it are drawn over the surface.
+  cursor: Vector3 | null;
+}
+
+// In pixels of the screen.
+export interface LivePicture {
+  // Of the canvas.
+  wide: number;
+  high: number;
+  // Of what is painted, which is enlarged to the canvas.
+  width: number;
+  height: number;
+  // It is painted in so many, and a change ends it after one of them.
+  bands: number;
+}
+
+// The colour of the surface, and of the lines over it with their opacity.
+const surfaceColour = new Vector3(0.86, 0.84, 0.78);
+const crossColour = '#2ce0cb';
+const crossOpacity = 0.45;
+
+// Where samples of the preview lie in the patient.
+export function placeOfSamples({ steps: [x, y, z], origin: [ox, oy, oz] }: Preview): Matrix4 {
+  return new Matrix4().set(x[0], y[0], z[0], ox, x[1], y[1], z[1], oy, x[2], y[2], z[2], oz, 0, 0, 0, 1);
+}
+
+// Six points, in samples: the ends of three lines through the cursor.
+function crossOf({ preview, cursor }: LiveScene): Float32Array<ArrayBuffer> {
+  const points = new Float32Array(18);
+  if (!cursor) return points;
+  const place = cursor.clone().applyMatrix4(placeOfSamples(preview).invert());
+  for (const axis of [0, 1, 2] as const) {
+    for (const end of [0, 1]) {
+      place.clone().setComponent(axis, end * (preview.dims[axis] - 1)).toArray(points, 3 * (2 * axis + end));
+    }
+  }
+  return points;
+}
+
+// The scene as the shader takes it: places in samples, directions as unit vectors in millimetres.
+function valuesOf({ preview, camera, target, iso, reach, kind, look, crop }: LiveScene): Record<string, number | Vector3 | Matrix4> {
+  const ofSamples = placeOfSamples(preview);
+  const dims = new Vector3(...preview.dims);
+  const last = dims.clone().subScalar(1);
+  const [low, high] = crop ?? [new Vector3(0, 0, 0), new Vector3(1, 1, 1)];
+  return {
+    toNormal: ofSamples.clone().setPosition(0, 0, 0).invert().transpose(),
+    eye: camera.position.clone().applyMatrix4(ofSamples.clone().invert()),
+    iso,
+    towardsLight: new Vector3(-0.35, 0.5, 1).transformDirection(camera.matrixWorld),
+    reach,
+    towardsEye: camera.position.clone().sub(target).normalize(),
+    edges: look?.edges ?? 0,
+    colour: surfaceColour,
+    kind: kinds[kind],
+    cropLow: low.clone().multiply(last),
+    isCropped: crop ? 1 : 0,
+    cropHigh: high.clone().multiply(last),
+    blockSize,
+    dims,
+  };
+}
 
 // The textures and buffers that the shader reads.
 interface Drawable {
@@ -84,14 +151,16 @@ function tablesOf(given: Look): Tables {
   return { look, sums };
 }
 
-export class GlPainter implements LivePainter {
+export class GlPainter {
   readonly canvas: HTMLCanvasElement;
+  // Software draws.
   readonly isSoftware: boolean;
+  // What it paints with is there.
   readonly ready: Promise<void>;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly uniforms = Object.fromEntries(
-    ['samples', 'blocks', 'look', 'sums', ...sceneFields.map(([name]) => name)].map((name): [string, IUniform<unknown>] => [name, { value: null }]),
+    [...fragmentShader.matchAll(/^uniform \w+ (\w+);$/gm)].map(([, name = '']): [string, IUniform<unknown>] => [name, { value: null }]),
   );
   private readonly box: Mesh<BoxGeometry, RawShaderMaterial>;
   private readonly cross = new LineSegments(
@@ -132,6 +201,7 @@ export class GlPainter implements LivePainter {
     this.ready = new Promise((resolve) => compile(this.renderer, shaders, this.over.signal, resolve));
   }
 
+  // Calls back with true when it is on the canvas, with false if `isOver` ended it.
   paint(scene: LiveScene, { wide, high, width, height, bands }: LivePicture, isOver: () => boolean, then: (isWhole: boolean) => void): void {
     if (this.canvas.width !== wide || this.canvas.height !== high) this.renderer.setSize(wide, high, false);
     this.use(scene);
@@ -143,6 +213,7 @@ export class GlPainter implements LivePainter {
     this.painting.paint({ width, height, isEnlarged: width < wide, steps: bands, begin }, isOver, then);
   }
 
+  // Keeps what it has of these previews, and lets go the others.
   keep(previews: ReadonlySet<Preview>): void {
     for (const [preview, made] of this.known) {
       if (previews.has(preview)) continue;
@@ -190,5 +261,6 @@ export class GlPainter implements LivePainter {
 
 function isSoftware(gl: WebGL2RenderingContext): boolean {
   const info = gl.getExtension('WEBGL_debug_renderer_info');
-  return isSoftwareName(String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
+  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }

@@ -131,6 +131,22 @@ export function slicePlane(volume: Directed, plane: Plane): SlicePlane {
   return { plane, normal: along[normals[plane]], right: sliceAxis(right), down: sliceAxis(down) };
 }
 
+// A volume's axes with its patient's sides exchanged along L, P or S, in the order that the server takes.
+export function flipped(volume: Directed, patientAxis: 0 | 1 | 2): string {
+  const axis = patientAxes(volume)[patientAxis];
+  return axes.map((each) => (each === axis ? `-${each}` : each)).join();
+}
+
+// What stands at the right of a slice then stands at its bottom.
+export function turned(volume: Directed, plane: Plane): string {
+  const { right, down } = slicePlane(volume, plane);
+  const order: string[] = [...axes];
+  const isOpposite = right.flipped !== down.flipped;
+  order[axisIndex(right.axis)] = `${isOpposite ? '-' : ''}${down.axis}`;
+  order[axisIndex(down.axis)] = `${isOpposite ? '' : '-'}${right.axis}`;
+  return order.join();
+}
+
 // The two axes of a slice's picture: its columns run along the first, its rows along the second.
 export function pictureAxes(normal: Axis): [0 | 1 | 2, 0 | 1 | 2] {
   return normal === 'x' ? [1, 2] : normal === 'y' ? [0, 2] : [0, 1];

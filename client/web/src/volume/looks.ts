@@ -4,13 +4,8 @@ import type { Window } from './slices';
 
 export type LookName = 'bone' | 'soft tissue' | 'lung' | 'airways' | 'MR';
 
-interface Stop {
-  // Hounsfield units; of MR, which has no unit, parts of the window.
-  at: number;
-  // Of one sample's length, 0 to 1.
-  opacity: number;
-  colour: string;
-}
+// A value in Hounsfield units, or of MR, which has no unit, a part of the window; how much is seen of one sample's length, 0 to 1.
+type Stop = readonly [at: number, opacity: number, colour: string];
 
 interface Preset {
   name: LookName;
@@ -20,59 +15,11 @@ interface Preset {
 }
 
 const presets: readonly Preset[] = [
-  {
-    name: 'bone',
-    edges: 0.2,
-    stops: [
-      { at: 130, opacity: 0, colour: '#8a4b32' },
-      { at: 260, opacity: 0.1, colour: '#c98f62' },
-      { at: 500, opacity: 0.5, colour: '#efdcb8' },
-      { at: 1400, opacity: 0.9, colour: '#fffaf0' },
-    ],
-  },
-  {
-    name: 'soft tissue',
-    edges: 0.75,
-    stops: [
-      { at: -160, opacity: 0, colour: '#d8a27c' },
-      { at: -60, opacity: 0.05, colour: '#e0b08a' },
-      { at: 20, opacity: 0.22, colour: '#c46a50' },
-      { at: 90, opacity: 0.34, colour: '#b04a3c' },
-      { at: 220, opacity: 0.3, colour: '#e2b48c' },
-      { at: 500, opacity: 0.7, colour: '#fff3df' },
-    ],
-  },
-  {
-    name: 'lung',
-    edges: 0.35,
-    stops: [
-      { at: -930, opacity: 0, colour: '#5d7fa8' },
-      { at: -780, opacity: 0.03, colour: '#86a9c9' },
-      { at: -560, opacity: 0.1, colour: '#d9a48f' },
-      { at: -380, opacity: 0.14, colour: '#e8c4a8' },
-      { at: -240, opacity: 0, colour: '#e8c4a8' },
-    ],
-  },
-  {
-    name: 'airways',
-    edges: 1,
-    stops: [
-      { at: -980, opacity: 0, colour: '#3f7f96' },
-      { at: -920, opacity: 0.4, colour: '#59a9be' },
-      { at: -860, opacity: 0.5, colour: '#8fd0dc' },
-      { at: -780, opacity: 0, colour: '#8fd0dc' },
-    ],
-  },
-  {
-    name: 'MR',
-    edges: 0.55,
-    stops: [
-      { at: 0.16, opacity: 0, colour: '#5a3a2e' },
-      { at: 0.3, opacity: 0.07, colour: '#a8735a' },
-      { at: 0.55, opacity: 0.28, colour: '#d8b8a0' },
-      { at: 1, opacity: 0.7, colour: '#fffaf2' },
-    ],
-  },
+  { name: 'bone', edges: 0.2, stops: [[130, 0, '#8a4b32'], [260, 0.1, '#c98f62'], [500, 0.5, '#efdcb8'], [1400, 0.9, '#fffaf0']] },
+  { name: 'soft tissue', edges: 0.75, stops: [[-160, 0, '#d8a27c'], [-60, 0.05, '#e0b08a'], [20, 0.22, '#c46a50'], [90, 0.34, '#b04a3c'], [220, 0.3, '#e2b48c'], [500, 0.7, '#fff3df']] },
+  { name: 'lung', edges: 0.35, stops: [[-930, 0, '#5d7fa8'], [-780, 0.03, '#86a9c9'], [-560, 0.1, '#d9a48f'], [-380, 0.14, '#e8c4a8'], [-240, 0, '#e8c4a8']] },
+  { name: 'airways', edges: 1, stops: [[-980, 0, '#3f7f96'], [-920, 0.4, '#59a9be'], [-860, 0.5, '#8fd0dc'], [-780, 0, '#8fd0dc']] },
+  { name: 'MR', edges: 0.55, stops: [[0.16, 0, '#5a3a2e'], [0.3, 0.07, '#a8735a'], [0.55, 0.28, '#d8b8a0'], [1, 0.7, '#fffaf2']] },
 ];
 
 export interface Look {
@@ -97,13 +44,13 @@ export function rgbOf(colour: string): [number, number, number] {
 
 // Beyond the last stop all is as there; before the first nothing is seen.
 function between(stops: readonly Stop[], at: number): [number, number, number, number] {
-  const after = stops.findIndex((stop) => at < stop.at);
+  const after = stops.findIndex(([end]) => at < end);
   const right = stops[after < 0 ? stops.length - 1 : after] as Stop;
   const left = stops[Math.max(0, after < 0 ? stops.length - 1 : after - 1)] as Stop;
-  const part = right.at > left.at ? (at - left.at) / (right.at - left.at) : 0;
-  const [from, to] = [rgbOf(left.colour), rgbOf(right.colour)];
+  const part = right[0] > left[0] ? (at - left[0]) / (right[0] - left[0]) : 0;
+  const [from, to] = [rgbOf(left[2]), rgbOf(right[2])];
   const mix = (a: number, b: number): number => a + (b - a) * Math.max(0, part);
-  const opacity = after === 0 ? 0 : mix(left.opacity, right.opacity);
+  const opacity = after === 0 ? 0 : mix(left[1], right[1]);
   return [mix(from[0], to[0]), mix(from[1], to[1]), mix(from[2], to[2]), 255 * opacity];
 }
 

@@ -6,6 +6,7 @@ import { formatDims, volumeFormatTitle, formatSpacing, formatValue } from '../..
 import { askText, tellError } from '../../ui/notices';
 import { go } from '../../ui/route';
 import { noteTexts, otherForm, skippedText, spanOf, volumeName } from '../../volume/names';
+import { orientation } from './orientation';
 import { uploads } from '../volumes/upload_panel';
 
 // Lists the skipped files of an upload, because a user may miss them.
@@ -100,7 +101,7 @@ export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement 
   return h('header.about', nameHeading(volume, onRenamed), h('p.facts', factsOf(volume)), ct);
 }
 
-// The notes and the skipped files of the upload.
+// The notes and the skipped files of the upload, and how to correct its orientation.
 export function notedOf(volume: Volume): (HTMLElement | null)[] {
-  return [notesOf(volume), ignoredNote(volume)];
+  return [notesOf(volume), ignoredNote(volume), orientation(volume)];
 }
