@@ -71,14 +71,14 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
   return level;
 }
 
-bool is_solid(const mesh::Topology& topology) {
-  return topology.boundary_edges == 0 && topology.manifold && topology.oriented;
-}
-
 // A level that will be written from the mesh itself.
 GlbLevel plain_level(double share, const mesh::Mesh& mesh, const MeshParameters& parameters) {
   GlbLevel level = {.share = share};
-  if (mesh.triangles.size() > 0) level.arrays.push_back(describe_plain(mesh, parameters));
+  if (mesh.triangles.size() > 0) {
+    level.arrays.push_back(
+        describe_plain(mesh.positions.size(), mesh.triangles.size(), parameters));
+    level.arrays.back().bounds = bounds_of(mesh.positions.span());
+  }
   check_glb_size(level.bytes(), parameters);
   return level;
 }

@@ -43,7 +43,7 @@ class WalkedGlb : public WalkedFile {
     return [this, made] { take(*made); };
   }
 
-  bool end() override {
+  bool end(const mesh::Topology& /*topology*/) override {
     if (!is_within_ && !seen_.is_empty()) {
       expected_ = std::exchange(seen_, {});
       is_within_ = true;

@@ -8,11 +8,16 @@
 #include "server/codec/encode.h"
 #include "server/codec/glb_document.h"
 #include "server/codec/walked_file.h"
+#include "server/mesh/topology/topology.h"
 
 namespace isomesh::codec {
 
 inline bool is_plain(const MeshParameters& parameters) {
   return parameters.glb_codec == GlbCodec::kNone;
+}
+
+inline bool is_solid(const mesh::Topology& topology) {
+  return topology.boundary_edges == 0 && topology.manifold && topology.oriented;
 }
 
 // Throws Error kTooLarge if a file of so many bytes cannot be.

@@ -42,16 +42,15 @@ class Writer {
 
 }  // namespace
 
-ArrayChunk describe_plain(const mesh::Mesh& mesh, const MeshParameters& parameters) {
+ArrayChunk describe_plain(std::size_t vertices, std::size_t triangles,
+                          const MeshParameters& parameters) {
   ArrayChunk chunk;
-  const std::size_t vertices = mesh.positions.size();
   chunk.vertices = static_cast<std::uint32_t>(vertices);
-  chunk.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
-  chunk.bounds = bounds_of(mesh.positions.span());
+  chunk.triangles = static_cast<std::uint32_t>(triangles);
   add_array<mesh::Vec3>(GlbArray::Kind::kPositions, vertices, chunk);
   if (parameters.normals) add_array<mesh::Vec3>(GlbArray::Kind::kNormals, vertices, chunk);
   if (parameters.distances) add_array<float>(GlbArray::Kind::kDistances, vertices, chunk);
-  add_array<std::uint32_t>(GlbArray::Kind::kIndices, 3 * mesh.triangles.size(), chunk);
+  add_array<std::uint32_t>(GlbArray::Kind::kIndices, 3 * triangles, chunk);
   return chunk;
 }
 

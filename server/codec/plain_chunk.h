@@ -2,6 +2,7 @@
 // Private to this folder.
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "server/codec/array_chunk.h"
@@ -10,8 +11,10 @@
 
 namespace isomesh::codec {
 
-// The arrays of the mesh. The chunk has no bytes: put_plain writes them. Constant memory.
-ArrayChunk describe_plain(const mesh::Mesh& mesh, const MeshParameters& parameters);
+// The arrays of a surface of that size, but for its bounds. The chunk has no bytes: put_plain
+// writes them. Constant memory.
+ArrayChunk describe_plain(std::size_t vertices, std::size_t triangles,
+                          const MeshParameters& parameters);
 
 // Writes those arrays. `distances` has one for each vertex, or none. Holds the normals in memory if
 // the mesh has none of its own. Throws Error kCancelled, which is checked between pieces.

@@ -21,13 +21,18 @@ std::uint64_t threads() { return static_cast<std::uint64_t>(mesh::thread_count()
 
 bool is_walked(MeshFormat format, const MeshParameters& parameters) {
   if (format == MeshFormat::kStl) return true;
-  return format == MeshFormat::kGlb && !is_plain(parameters) && !parameters.merge &&
+  // Plain ones are merged as they are.
+  return format == MeshFormat::kGlb && (is_plain(parameters) || !parameters.merge) &&
          !parameters.distances && parameters.lods.size() <= 1;
 }
 
-std::uint32_t walked_depth(MeshFormat format, const MeshParameters& /*parameters*/,
+bool is_set_aside(MeshFormat format, const MeshParameters& parameters) {
+  return format == MeshFormat::kGlb && is_plain(parameters);
+}
+
+std::uint32_t walked_depth(MeshFormat format, const MeshParameters& parameters,
                            const mesh::SurfaceSize& size) {
-  if (format != MeshFormat::kGlb) return 0;
+  if (format != MeshFormat::kGlb || is_plain(parameters)) return 0;
   const BlockCut cut(size.triangles, size.layers, kTrianglesPerBlock);
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(cut.depth, size.layers));
 }
@@ -36,13 +41,15 @@ std::uint64_t walked_memory(MeshFormat format, const MeshParameters& parameters,
                             const mesh::SurfaceSize& size, bool has_spool) {
   if (format != MeshFormat::kGlb) return threads() * kPartsPerThread;
   const auto file = static_cast<std::uint64_t>(describe(format).bytes(size, parameters));
+  if (is_plain(parameters)) return threads() * kPartsPerThread + (has_spool ? 0 : file);
   return threads() * std::min<std::uint64_t>(kTrianglesPerBlock, size.triangles) *
              kEncoderBytesPerTriangle +
          (has_spool ? 0 : file);
 }
 
 std::unique_ptr<WalkedFile> walked_file(const WalkedContent& content) {
-  return content.format == MeshFormat::kGlb ? walked_glb(content) : walked_stl(content);
+  if (content.format != MeshFormat::kGlb) return walked_stl(content);
+  return is_plain(content.provenance.parameters) ? walked_plain_glb(content) : walked_glb(content);
 }
 
 }  // namespace isomesh::codec

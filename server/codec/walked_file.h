@@ -10,6 +10,7 @@
 #include "server/mesh/context.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/spool.h"
+#include "server/mesh/topology/topology.h"
 #include "server/mesh/walk/walk.h"
 
 namespace isomesh::codec {
@@ -28,9 +29,9 @@ class WalkedFile {
   virtual std::size_t parts(const mesh::Window& window) const = 0;
   // As WindowUser::work.
   virtual mesh::WindowUser::InOrder work(const mesh::Window& window, std::size_t part) = 0;
-  // After all windows. Returns false if they have to come again, from the first, with which the
-  // file begins again; the second time they do not have to.
-  virtual bool end() { return true; }
+  // After all windows, whose topology is known then. Returns false if they have to come again, from
+  // the first, with which the file begins again; the second time they do not have to.
+  virtual bool end(const mesh::Topology& /*topology*/) { return true; }
 };
 
 // Its members must outlive the file.
@@ -49,6 +50,10 @@ struct WalkedContent {
 // the surface as a whole. The bytes are the same.
 bool is_walked(MeshFormat format, const MeshParameters& parameters);
 
+// True if all of such a file is set aside before its first byte: that costs more time than a small
+// surface as a whole does.
+bool is_set_aside(MeshFormat format, const MeshParameters& parameters);
+
 // How many layers the windows need to have; 0: it does not matter.
 std::uint32_t walked_depth(MeshFormat format, const MeshParameters& parameters,
                            const mesh::SurfaceSize& size);
@@ -63,5 +68,6 @@ std::unique_ptr<WalkedFile> walked_file(const WalkedContent& content);
 // Those of one format each.
 std::unique_ptr<WalkedFile> walked_stl(const WalkedContent& content);
 std::unique_ptr<WalkedFile> walked_glb(const WalkedContent& content);
+std::unique_ptr<WalkedFile> walked_plain_glb(const WalkedContent& content);
 
 }  // namespace isomesh::codec

@@ -121,6 +121,10 @@ bool can_be_walked(const MeshParameters& parameters, bool certify) {
 bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters, bool certify) {
   constexpr std::uint64_t kFewTriangles = std::uint64_t{1} << 21;
   if (!can_be_walked(parameters, certify)) return false;
+  const bool is_set_aside = std::ranges::any_of(files_of(parameters), [&](MeshFormat format) {
+    return codec::is_set_aside(format, parameters);
+  });
+  if (is_set_aside && surface.triangles < kFewTriangles) return false;
   const std::uint64_t depth = walk_options({}, parameters, surface).depth;
   const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
   return threads == 1 || depth == 0 || surface.triangles >= kFewTriangles ||

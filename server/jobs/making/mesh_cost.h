@@ -25,8 +25,9 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 // written as triangles come, and nothing else needs the surface as a whole.
 bool can_be_walked(const MeshParameters& parameters, bool certify);
 
-// True if such a job is made so. A small surface of few windows would not keep all threads busy: it
-// is made as a whole, which gives the same.
+// True if such a job is made so. A small surface of few windows would not keep all threads busy,
+// and one whose file is set aside first would take longer: it is made as a whole, which gives the
+// same.
 bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters, bool certify);
 
 // The options of that walk.

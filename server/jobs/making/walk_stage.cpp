@@ -59,12 +59,16 @@ class FilesAndMeasures : public mesh::WindowUser {
     return [] {};
   }
 
+  mesh::Topology topology(const mesh::SurfaceSize& surface) const {
+    return topology_.result(surface.vertices, surface.triangles);
+  }
+
   void set_measures(const mesh::SmoothingEffect& effect, const mesh::SurfaceSize& surface,
                     MeshSummary& summary) const {
     set_smoothing(extracted_.result(), effect, summary);
     if (is_smoothed_) set_final(final_.result(), summary.quality);
     set_size(surface, summary);
-    set_topology(topology_.result(surface.vertices, surface.triangles), summary);
+    set_topology(topology(surface), summary);
   }
 
  private:
@@ -120,7 +124,8 @@ std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequ
                                     Progress::Seconds{Stage::kSmooth, end.seconds.smoothing},
                                     Progress::Seconds{Stage::kEncode, end.seconds.using_it}});
       user.set_measures(end.effect, surface, summary);
-      std::erase_if(files, [](const auto& file) { return file->end(); });
+      const mesh::Topology topology = user.topology(surface);
+      std::erase_if(files, [&](const auto& file) { return file->end(topology); });
     }
     return summary;
   });

@@ -146,6 +146,13 @@ class Walk {
     }
   }
 
+  void write(std::uint32_t begin, std::uint32_t end, Window& window) {
+    window.first_layer = begin;
+    window.first_vertex = surface_.count().layer_vertices[begin];
+    window.first_triangle = surface_.count().layer_triangles[begin];
+    surface_.write(begin, end, window.mesh);
+  }
+
   // The task that brings the oldest window on, of those that can run now.
   std::optional<Task> take() ISOMESH_REQUIRES(mutex_) {
     if (const auto next = waiting_.find({used_, used_parts_});
@@ -176,8 +183,7 @@ class Walk {
   void run(Task& task) {
     switch (task.kind) {
       case Kind::kWrite:
-        at(task.window).first_layer = begin_of(task.window);
-        return surface_.write(begin_of(task.window), end_of(task.window), at(task.window).mesh);
+        return write(begin_of(task.window), end_of(task.window), at(task.window));
       case Kind::kSmooth:
         see(task.window);
         return smooth(task.window);

@@ -22,7 +22,9 @@
 namespace isomesh::mesh {
 
 struct Window {
-  std::uint32_t first_layer = 0;  // of the surface
+  std::uint32_t first_layer = 0;  // of the surface, as the next two
+  std::uint64_t first_vertex = 0;
+  std::uint64_t first_triangle = 0;
   // As SurfaceWindows::write leaves it, then with the vertices of the layer behind it.
   Mesh mesh;
   // The triangles of the layer below the window, by its numbers, modulo 2^32.

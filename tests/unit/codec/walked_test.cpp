@@ -54,7 +54,14 @@ struct Case {
   int walks = 0;
 };
 
+mesh::Mesh whole(const Case& one) {
+  mesh::Mesh mesh = test::extracted(one.volume, one.extract);
+  smooth(one.smooth, {}, mesh);
+  return mesh;
+}
+
 std::string walked(Case& one, MeshFormat format) {
+  const mesh::Topology topology = measure_topology(whole(one), {});
   const auto lattice = one.volume.lattice();
   Provenance provenance;
   provenance.parameters = one.parameters;
@@ -77,14 +84,8 @@ std::string walked(Case& one, MeshFormat format) {
     OneFile user(*file);
     walk(windows, {one.smooth, static_cast<std::uint32_t>(cut.depth), true}, {}, user);
     ++one.walks;
-  } while (!file->end());
+  } while (!file->end(topology));
   return bytes;
-}
-
-mesh::Mesh whole(const Case& one) {
-  mesh::Mesh mesh = test::extracted(one.volume, one.extract);
-  smooth(one.smooth, {}, mesh);
-  return mesh;
 }
 
 // The triangles by the places of their corners, of which some may be equal.
@@ -165,6 +166,27 @@ TEST(WalkedGlb, HasTheBytesOfTheWholeSurface) {
     const mesh::Mesh mesh = whole(one);
     ASSERT_GT(cut_blocks(mesh, kTrianglesPerBlock).size(), 1U);
     EXPECT_TRUE(walked(one, MeshFormat::kGlb) == encoded_whole(one, mesh));
+  }
+}
+
+// As a whole, and with the spool and without.
+TEST(WalkedGlb, HasTheBytesOfTheWholeSurfaceIfItIsPlain) {
+  for (const Bytes& volume : volumes()) {
+    for (const bool close : {false, true}) {
+      for (const bool normals : {false, true}) {
+        for (const int threads : {1, 3}) {
+          const test::ThreadCount several(threads);
+          test::MemorySpool spool;
+          Case one = {
+              volume, {.iso = 60, .close = close, .regularize = true}, {.steps = means(5, {1})}};
+          one.parameters.glb_codec = GlbCodec::kNone;
+          one.parameters.normals = normals;
+          if (threads == 3) one.spool = &spool;
+          EXPECT_TRUE(walked(one, MeshFormat::kGlb) == encoded_whole(one, whole(one)));
+          EXPECT_EQ(one.walks, 1);
+        }
+      }
+    }
   }
 }
 

@@ -77,7 +77,7 @@ TEST(CanBeWalked, OnlyWithoutWhatNeedsTheWholeSurface) {
     });
   };
   EXPECT_TRUE(as_glb([](MeshParameters& /*p*/) {}));
-  EXPECT_FALSE(as_glb([](MeshParameters& p) { p.glb_codec = GlbCodec::kNone; }));
+  EXPECT_TRUE(as_glb([](MeshParameters& p) { p.glb_codec = GlbCodec::kNone; }));
   EXPECT_FALSE(as_glb([](MeshParameters& p) { p.merge = true; }));
   EXPECT_FALSE(as_glb([](MeshParameters& p) { p.distances = true; }));
   EXPECT_FALSE(as_glb([](MeshParameters& p) { p.lods = {1, 0.5}; }));
@@ -103,6 +103,10 @@ TEST(IsWalked, UnlessASmallSurfaceHasTooFewWindowsForTheThreads) {
       EXPECT_EQ(is_walked(small, parameters, false), !is_few);
       EXPECT_TRUE(is_walked(large, parameters, false));
       EXPECT_FALSE(is_walked(large, parameters, true));
+      MeshParameters plain = parameters;
+      plain.glb_codec = GlbCodec::kNone;
+      EXPECT_EQ(is_walked(small, plain, false), format == MeshFormat::kStl);
+      EXPECT_TRUE(is_walked(large, plain, false));
     }
   }
 }
