@@ -86,9 +86,11 @@ async function showImage(volume) {
 }
 
 async function addSegmentation(volume, image) {
-  const distance = Math.max(...['origin', 'direction', 'spacing'].flatMap((member) => volume[member].map((value, at) => Math.abs(value - image[member][at]))));
-  if (String(volume.dims) !== String(image.dims) || distance > 1e-3) throw new Error('The segmentation is not on the grid of the image.');
-  if (!Number.isInteger(volume.range[1]) || volume.range[0] < 0 || volume.range[1] > 255) throw new Error('This page takes segmentations with labels from 0 to 255.');
+  const differenceOf = (member) => Math.max(...volume[member].map((value, at) => Math.abs(value - image[member][at])));
+  const isOffGrid = ['origin', 'direction', 'spacing'].some((member) => differenceOf(member) > 1e-3);
+  if (String(volume.dims) !== String(image.dims) || isOffGrid) throw new Error('The segmentation is not on the grid of the image.');
+  const [lowest, highest] = volume.range;
+  if (!Number.isInteger(highest) || lowest < 0 || highest > 255) throw new Error('This page takes labels from 0 to 255.');
   addVolume(segmentationId, volume, await samples(volume, { as: Uint8Array }));
   // Without this list, cornerstone3D converts the segment 1 only.
   const { labels } = await labelsOf(volume);
@@ -140,7 +142,8 @@ async function measured(name, make) {
   const megabytes = (count) => `${(count / 1e6).toFixed(1)} MB`;
   const cells = [made.segments, made.triangles, `${seconds.toFixed(2)} s`, megabytes(made.bytes), grown === null ? 'unknown' : megabytes(grown)];
   const segmentsBox = boxOfSegments();
-  const off = Math.max(...boxOf(made.points.flatMap((each) => boxOf(each))).map((value, at) => Math.abs(value - segmentsBox[at])));
+  const box = boxOf(made.points.flatMap((each) => boxOf(each)));
+  const off = Math.max(...box.map((value, at) => Math.abs(value - segmentsBox[at])));
   cells.push(`${off.toFixed(2)} mm`);
   const row = rows.insertRow();
   row.append(Object.assign(document.createElement('th'), { textContent: name }));
