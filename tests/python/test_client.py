@@ -253,6 +253,12 @@ class Jobs(DaemonTest):
         again = self.client.submit(volume, **parameters)
         self.assertEqual(again["parameters"], {"volume": volume["id"], **parameters})
 
+    def test_an_empty_surface_is_a_mesh_with_a_warning(self):
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "empty"):
+            mesh = self.client.mesh(ball(), iso=1e6)
+        self.assertTrue(mesh.job["mesh"]["empty"])
+        self.assertEqual((mesh.vertices.shape, mesh.faces.shape), ((0, 3), (0, 3)))
+
     def test_a_cancelled_job_fails_whoever_waits(self):
         volume = self.client.upload(numpy.random.default_rng(1).random((128, 128, 96), "float32"))
         job = self.client.submit(volume, iso=0.5, passes=1000, formats=["ply"])

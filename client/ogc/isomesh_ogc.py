@@ -1,0 +1,231 @@
+"""OGC API - Processes, Part 1: Core 1.0 (OGC 18-062r2) in front of an isomesh daemon: one process, `mesh`.
+
+    python3 isomesh_ogc.py [--port 8090] [--server http://127.0.0.1:8080]
+
+It keeps nothing: jobs are the daemon's, and so are the rights. `Authorization` is passed on. A job's number ends with the form of
+its results that the execute request asked for.
+"""
+
+import argparse
+import json
+import re
+import urllib.error
+import urllib.request
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+LARGEST_REQUEST = 1 << 20
+TIMEOUT = 60
+CONFORMANCE = [f"http://www.opengis.net/spec/ogcapi-processes-1/1.0/conf/{each}" for each in ("core", "ogc-process-description", "json", "dismiss")]
+EXCEPTION = "http://www.opengis.net/def/exceptions/ogcapi-processes-1/1.0/"
+STATES = {"queued": "accepted", "running": "running", "succeeded": "successful", "failed": "failed", "cancelled": "dismissed"}
+JSON = "application/json"
+PROBLEM = "application/problem+json"
+NAMES = r"[A-Za-z0-9_-]+"
+
+SUMMARY = {
+    "id": "mesh",
+    "title": "Surface of a volume",
+    "description": "Makes the surface of an iso-value or of labels of a volume that is stored in the daemon.",
+    "version": "1",
+    "jobControlOptions": ["async-execute", "dismiss"],
+    "outputTransmission": ["reference"],
+}
+INPUTS = {
+    "volume": ("The id of a volume, as POST /v1/volumes of the daemon returns it.", {"type": "string", "pattern": "^[0-9a-f]{64}$"}, 1),
+    "format": ("The format of the file.", {"type": "string", "enum": ["glb", "stl", "ply", "obj", "3mf", "vtk", "vtp", "off", "gii", "drc"]}, 1),
+    "parameters": (
+        "Other members of the daemon's JobRequest (openapi.yaml), such as iso, labels, max_error_mm.",
+        {"type": "object", "not": {"anyOf": [{"required": ["volume"]}, {"required": ["formats"]}]}},
+        0,
+    ),
+}
+MESH = {"title": "The mesh", "schema": {"type": "string", "format": "binary"}}
+
+
+class Failure(Exception):
+    def __init__(self, status, title, detail="", kind="about:blank"):
+        super().__init__(title)
+        self.status = status
+        self.problem = {"type": kind, "title": title, "status": status, "detail": detail}
+
+
+def description():
+    inputs = {
+        name: {"title": name, "description": text, "schema": schema, "minOccurs": least, "maxOccurs": 1}
+        for name, (text, schema, least) in INPUTS.items()
+    }
+    return {**SUMMARY, "inputs": inputs, "outputs": {"mesh": MESH}, "links": []}
+
+
+class Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    timeout = TIMEOUT
+    server_version = "isomesh-ogc"
+
+    def log_message(self, *_):
+        pass
+
+    def do_GET(self):
+        self._answer(
+            {
+                r"/": self._landing,
+                r"/conformance": lambda: self._send(200, {"conformsTo": CONFORMANCE}),
+                r"/processes": lambda: self._send(200, {"processes": [SUMMARY], "links": [self._link("/processes", "self")]}),
+                rf"/processes/({NAMES})": lambda name: self._send(200, self._process(name)),
+                rf"/jobs/({NAMES})\.(raw|document)": lambda job, form: self._send(200, self._status(self._job(job), form)),
+                rf"/jobs/({NAMES})\.(raw|document)/results": self._results,
+            }
+        )
+
+    def do_POST(self):
+        self._answer({rf"/processes/({NAMES})/execution": self._execute})
+
+    def do_DELETE(self):
+        self._answer({rf"/jobs/({NAMES})\.(raw|document)": self._dismiss})
+
+    def _answer(self, routes):
+        try:
+            # A name that a stranger's DNS leads to this machine.
+            if self.headers.get("Host", "").partition(":")[0] not in self.server.names:
+                raise Failure(421, "Unknown host", "Start the service with --host NAME if clients know it by this name.")
+            path = self.path.partition("?")[0]
+            for pattern, run in routes.items():
+                found = re.fullmatch(pattern, path)
+                if found:
+                    run(*found.groups())
+                    return
+            kind = "no-such-job" if path.startswith("/jobs/") else "no-such-process" if path.startswith("/processes/") else "not-found"
+            raise Failure(404, "Not found", f"There is no {path}.", EXCEPTION + kind)
+        except Failure as failure:
+            self._send(failure.status, failure.problem, {"Content-Type": PROBLEM})
+
+    def _send(self, status, value=None, headers=None):
+        body = b"" if value is None else json.dumps(value).encode()
+        self.send_response(status)
+        for name, text in {"Content-Type": JSON, **(headers or {})}.items():
+            self.send_header(name, text)
+        if status >= 400:  # the request's body may be unread
+            self.send_header("Connection", "close")
+            self.close_connection = True
+        if status != 204:
+            self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def _daemon(self, method, path, value=None, missing=""):
+        """The daemon's JSON. Its problems become this service's."""
+        headers = {"Content-Type": JSON}
+        if self.headers.get("Authorization"):
+            headers["Authorization"] = self.headers["Authorization"]
+        body = None if value is None else json.dumps(value).encode()
+        request = urllib.request.Request(self.server.daemon + path, body, headers, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=TIMEOUT) as response:
+                return json.load(response)
+        except urllib.error.HTTPError as error:
+            with error:
+                problem = json.loads(error.read() or b"{}") if PROBLEM in error.headers.get("Content-Type", "") else {}
+            kind = missing if error.code == 404 and missing else problem.get("type", "about:blank")
+            raise Failure(error.code, problem.get("title", error.reason), problem.get("detail", ""), kind) from None
+        except OSError as error:
+            raise Failure(502, "The daemon does not respond", str(error)) from None
+
+    def _link(self, path, relation, kind=JSON):
+        return {"href": f"http://{self.headers.get('Host', 'localhost')}{path}", "rel": relation, "type": kind}
+
+    def _landing(self):
+        links = [
+            self._link("/", "self"),
+            self._link("/conformance", "http://www.opengis.net/def/rel/ogc/1.0/conformance"),
+            self._link("/processes", "http://www.opengis.net/def/rel/ogc/1.0/processes"),
+            {"href": f"{self.server.daemon}/openapi.yaml", "rel": "service-desc", "type": "application/yaml", "title": "The daemon's own API"},
+        ]
+        self._send(200, {"title": "isomesh", "description": "Surface meshes of medical volumes", "links": links})
+
+    def _process(self, name):
+        if name != "mesh":
+            raise Failure(404, "No such process", f"There is no process {name}; the only one is mesh.", EXCEPTION + "no-such-process")
+        return description()
+
+    def _execute(self, name):
+        self._process(name)
+        # A page of another site can send other types without asking.
+        if self.headers.get_content_type() != JSON:
+            raise Failure(415, "Not JSON", f"The request's Content-Type must be {JSON}.")
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > LARGEST_REQUEST:
+            raise Failure(413 if length.isdecimal() else 411, "The request needs a length", f"At most {LARGEST_REQUEST} bytes are read.")
+        try:
+            request = json.loads(self.rfile.read(int(length)))
+        except (ValueError, RecursionError) as error:
+            raise Failure(400, "No JSON", str(error)) from None
+        inputs = request.get("inputs") if isinstance(request, dict) else None
+        if not isinstance(inputs, dict):
+            raise Failure(400, "No inputs", "The request needs the member inputs, an object.")
+        unknown = sorted(set(inputs) - set(INPUTS))
+        missing = sorted(name for name, (_, _, least) in INPUTS.items() if least and name not in inputs)
+        parameters = inputs.get("parameters", {})
+        form = request.get("response", "raw")
+        if unknown or missing or not isinstance(parameters, dict) or {"volume", "formats"} & set(parameters):
+            raise Failure(400, "Wrong inputs", f"Unknown: {unknown}. Missing: {missing}. parameters is an object without volume and formats.")
+        if form not in ("raw", "document"):
+            raise Failure(400, "Wrong response", "response is raw or document.")
+        job = self._daemon("POST", "/v1/jobs", {**parameters, "volume": inputs["volume"], "formats": [inputs["format"]]})
+        status = self._status(job, form)
+        self._send(201, status, {"Location": self._link(f"/jobs/{status['jobID']}", "self")["href"], "Preference-Applied": "respond-async"})
+
+    def _job(self, job):
+        return self._daemon("GET", f"/v1/jobs/{job}", missing=EXCEPTION + "no-such-job")
+
+    def _status(self, job, form):
+        path = f"/jobs/{job['id']}.{form}"
+        status = {
+            "jobID": f"{job['id']}.{form}",
+            "processID": "mesh",
+            "type": "process",
+            "status": STATES[job["state"]],
+            "progress": int(100 * job["progress"]),
+            "links": [self._link(path, "self")],
+        }
+        status.update({name: job[name] for name in ("created", "started", "finished") if job.get(name)})
+        if job.get("error"):
+            status["message"] = job["error"].get("detail") or job["error"]["title"]
+        if job["state"] == "succeeded":
+            status["links"].append(self._link(f"{path}/results", "http://www.opengis.net/def/rel/ogc/1.0/results"))
+        return status
+
+    def _results(self, job, form):
+        made = self._job(job)
+        if made["state"] in ("queued", "running"):
+            raise Failure(404, "The result is not ready", f"The job is {made['state']}.", EXCEPTION + "result-not-ready")
+        if made["state"] != "succeeded":
+            error = made.get("error") or {}
+            raise Failure(error.get("status", 410), f"The job is {made['state']}", error.get("detail", ""), error.get("type", "about:blank"))
+        ((_, file),) = made["mesh"]["files"].items()
+        address = self.server.daemon + file["href"]
+        if form == "document":
+            self._send(200, {"mesh": {"href": address}})
+        else:
+            self._send(204, headers={"Link": f'<{address}>; rel="mesh"'})
+
+    def _dismiss(self, job, form):
+        made = self._daemon("DELETE", f"/v1/jobs/{job}?erase=false", missing=EXCEPTION + "no-such-job")
+        self._send(200, self._status(made, form))
+
+
+def serve(port, daemon, names=()):
+    server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    server.daemon = daemon.rstrip("/")
+    server.names = {"localhost", "127.0.0.1", *names}
+    return server
+
+
+if __name__ == "__main__":
+    options = argparse.ArgumentParser(description="OGC API - Processes in front of an isomesh daemon")
+    options.add_argument("--port", type=int, default=8090)
+    options.add_argument("--server", default="http://127.0.0.1:8080", help="the daemon's address, which clients get for results")
+    options.add_argument("--host", action="append", default=[], help="another name of this service, as a proxy in front of it passes on; repeatable")
+    given = options.parse_args()
+    with serve(given.port, given.server, given.host) as running:
+        print(f"listening on http://127.0.0.1:{running.server_port}", flush=True)
+        running.serve_forever()
