@@ -78,7 +78,7 @@ class LabelComparison {
   void compare_surface_nets() {
     if (plan_.surface_nets_root.empty()) return;
     SurfaceNets nets(plan_.surface_nets_root, samples_, stages_.labels(), plan_.threads);
-    const auto compare = [&](const std::string& what, const Timed& ours, Goal goal) {
+    const auto compare = [&](const std::string& what, const Timed& ours, std::optional<Goal> goal) {
       time_ms(ours);
       add(what + " / SurfaceNets with 16 passes",
           pair_times([&] { return time_ms(ours); }, [&] { return nets.run_ms(); }, kLabelPairs),
