@@ -196,13 +196,11 @@ class Client(Batches):
 
     def rename(self, volume: Union[str, api.Volume], name: Optional[str]) -> api.Volume:
         """Gives a volume another name; None removes its name."""
-        renamed = self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}, answers.VOLUME)
-        return cast("api.Volume", renamed)
+        return cast("api.Volume", self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}, answers.VOLUME))
 
     def reorient(self, volume: Union[str, api.Volume], axes: str) -> api.Volume:
-        """Stores a flipped or turned copy of a volume that its file places wrongly. `axes` are those whose directions
-        x, y and z get: "-x,y,z" flips along x, "y,-x,z" turns by 90 degrees about z."""
-        path = _volume_path(volume) + "/reoriented?" + urlencode({"axes": axes})
+        """Stores a flipped ("-x,y,z") or turned ("y,-x,z") copy of a volume. `axes` are those whose directions x, y and z get."""
+        path = f"{_volume_path(volume)}/reoriented?{urlencode({'axes': axes})}"
         return cast("api.Volume", self._exchange.send_json("POST", path, None, answers.VOLUME))
 
     def erase(self, volume: Union[str, api.Volume], *, jobs: bool = False) -> None:
@@ -211,8 +209,7 @@ class Client(Batches):
 
     def histogram(self, volume: Union[str, api.Volume], bins: int = 256) -> api.Histogram:
         """How many samples have a value in each of `bins` equal intervals."""
-        target = f"{_volume_path(volume)}/histogram?bins={int(bins)}"
-        return cast("api.Histogram", self._exchange.get(target, answers.HISTOGRAM))
+        return cast("api.Histogram", self._exchange.get(f"{_volume_path(volume)}/histogram?bins={int(bins)}", answers.HISTOGRAM))
 
     def labels(self, volume: Union[str, api.Volume], background: int = 0) -> api.VolumeLabels:
         """The labels of a segmentation, with their voxels, volumes, names and colours."""
@@ -307,14 +304,12 @@ class Client(Batches):
     def job_labels(self, job: Union[str, AnyJob]) -> List[api.LabelSummary]:
         """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
         number, `job["mesh"]["labels_count"]`."""
-        pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
-        return cast("List[api.LabelSummary]", list(pages))
+        return cast("List[api.LabelSummary]", list(self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})))
 
     def job_walls(self, job: Union[str, AnyJob]) -> List[api.WallSummary]:
         """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None.
         In ascending order of labels."""
-        pages = self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, {})
-        return cast("List[api.WallSummary]", list(pages))
+        return cast("List[api.WallSummary]", list(self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, {})))
 
     def report(self, job: Union[str, AnyJob]) -> api.JobReport:
         """What a succeeded job made, of what and how: to keep beside its mesh."""
