@@ -9,19 +9,12 @@ const apache = new URL('../../LICENSE', import.meta.url);
 // What three brings of others, and does not say in its own licence.
 const within = {
   draco: { license: 'Apache-2.0', text: () => readFileSync(apache, 'utf8') },
-  fflate: { license: 'MIT', text: () => `Copyright (c) Arjun Barrett\n\n${mitOf('three')}` },
 };
 
 function licenseOf(name) {
   const file = readdirSync(modules + name).find((each) => /^licen[cs]e/i.test(each));
   if (!file) throw new Error(`${name} has no file of its licence`);
   return readFileSync(`${modules}${name}/${file}`, 'utf8');
-}
-
-// The words of the licence without whose copyright it is.
-function mitOf(name) {
-  const text = licenseOf(name);
-  return text.slice(text.indexOf('Permission is hereby granted'));
 }
 
 function packageOf(id) {
