@@ -22,7 +22,7 @@ const options = ['--listen', '127.0.0.1:0', '--data', join(folder, 'data'), '--l
 const daemon = spawn(isomeshd, options, { stdio: ['ignore', 'pipe', 'inherit'] });
 const browser = await chromium.launch({ executablePath, args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'] });
 
-// Of a figure with its unit.
+// The number of a figure with its unit.
 const numberIn = (text) => Number.parseFloat(text);
 
 try {

@@ -1,4 +1,4 @@
-// Where a surface meets the slice that a viewport shows, drawn over the slice. The surface is cut in the patient's millimetres, so
+// The line where a surface meets the slice that a viewport shows, drawn over the slice. The surface is cut in the patient's millimetres, so
 // the outlines lie right only if the surface and the volume do.
 import { Enums } from '@cornerstonejs/core';
 import vtkPlane from '@kitware/vtk.js/Common/DataModel/Plane.js';

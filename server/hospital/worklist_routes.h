@@ -6,7 +6,7 @@
 
 namespace isomesh::hospital {
 
-// What the routes of the own worklist need; all must outlive them.
+// The routes of the own worklist need these; all must outlive them.
 struct OwnWorklist {
   const orders::WorklistSettings& settings;
   store::WorkitemStore& workitems;

@@ -29,7 +29,7 @@ WORKITEMS = "/v1/dicomweb/workitems"
 
 
 def workitem(series, patient="PAT-4711"):
-    """What a scheduler sends."""
+    """A workitem as a scheduler sends it."""
     return {STATE: {"vr": "CS", "Value": ["SCHEDULED"]},
             "00100020": {"vr": "LO", "Value": [patient]},
             "0020000D": {"vr": "UI", "Value": [series.study]},
@@ -119,7 +119,7 @@ class OwnWorklist(Loop):
             self.assert_performed(daemon, daemon, uid, each)
 
     def test_a_failure_and_a_cancellation(self):
-        """What nobody performs is cancelled here; what isomesh performs, by cancelling its order."""
+        """A workitem that nobody performs is cancelled here; one that isomesh performs, by its order."""
         listing = self.daemon(rules="[worklist]")
         refused = self.scheduled(listing, self.series())
         reason = {"00741238": {"vr": "LT", "Value": ["Wrong patient"]}}
@@ -183,7 +183,7 @@ class OwnWorklist(Loop):
         self.assertEqual((status, warning),
                          (202, "The UPS is already in the requested state of CANCELED."))
         self.assertNotIn("1.99", daemon.logged())
-        # What nobody changes for --keep-days is removed.
+        # A workitem that nobody changes for --keep-days is removed.
         daemon.kill()
         with contextlib.closing(sqlite3.connect(os.path.join(daemon.data, "isomesh.sqlite"))) as all_:
             all_.execute("UPDATE workitems SET changed = changed - ? WHERE uid = ?",

@@ -39,7 +39,7 @@ def label_of(x, y, z):
 
 SIZE, SLICES = 23, 12
 
-# What pydicom reads of a segmentation: of each frame the slice, the segment and the samples.
+# pydicom reads these of a segmentation: the slice, the segment and the samples of each frame.
 READER = """
 import json, sys, pydicom
 data = pydicom.dcmread(sys.argv[1])

@@ -54,7 +54,7 @@ class Encrypted(Receiver):
                 f'certificate-file = "{self.ours[0]}"\nkey-file = "{self.ours[1]}"\n')
 
     def options(self, identity=None, authority=None):
-        """Of DCMTK's programs."""
+        """Options of DCMTK's programs."""
         certificate, key = identity or self.scanner
         return ["+tls", key, certificate, "+cf", (authority or self.hospital).file]
 

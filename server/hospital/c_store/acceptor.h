@@ -34,7 +34,7 @@ struct AcceptorLimits {
   std::chrono::milliseconds wait_time{60'000};  // for a place, from the complete request on
 };
 
-// What the acceptor's thread calls.
+// The acceptor's thread calls these.
 struct AcceptorHooks {
   // Takes the request and returns true, or leaves it waiting and returns false. Must not block. Is
   // called for each waiting request, oldest first, and again soon.

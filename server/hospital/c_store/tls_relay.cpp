@@ -24,7 +24,7 @@ using State = Transfer::State;
 // For the last bytes of an association: a peer that takes none holds up nothing.
 constexpr std::chrono::seconds kLastBytes{2};
 
-// What a direction waits for, as events of poll().
+// A direction waits for these events of poll().
 struct Waits {
   short source = 0;
   short sink = 0;

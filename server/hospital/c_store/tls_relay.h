@@ -26,7 +26,7 @@ class TlsRelay {
 
   // Starts at once. Throws Error kInternal.
   explicit TlsRelay(std::unique_ptr<net::TlsStream> peer);
-  // What was written to the plain end still gets to the peer, if that takes it soon.
+  // Bytes that were written to the plain end still get to the peer, if that takes them soon.
   ~TlsRelay();
   TlsRelay(const TlsRelay&) = delete;
   TlsRelay& operator=(const TlsRelay&) = delete;

@@ -30,8 +30,8 @@ struct LabelGrid {
 LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>& dims,
                      const Volume& labels);
 
-// Where the segments have samples, by segment, then by slice. `labels` are those of the segments.
-// Throws Error kCancelled, and kInternal if the blob is damaged.
+// The slices where the segments have samples, by segment, then by slice. `labels` are those of the
+// segments. Throws Error kCancelled, and kInternal if the blob is damaged.
 std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
                                                 std::span<const std::int64_t> labels,
                                                 const store::BlobStore& blobs,

@@ -81,7 +81,7 @@ DataSet item_of(const DataSet& data, const char* sequence) {
   return !items.empty() && items.front().is_object() ? items.front() : json::object();
 }
 
-// What a workitem has when it is canceled: the time, and a reason as a code.
+// A canceled workitem has the time, and a reason as a code.
 void note_cancellation(DataSet& progress, store::Time now) {
   if (values_of(progress, kCancelled).empty()) {
     progress[kCancelled] = attribute("DT", moment_of(now));

@@ -32,7 +32,7 @@ class Refusal : public Error {
 
 std::string_view to_string(store::WorkitemState state);
 
-// What the standard says about a workitem that already is in the requested state.
+// The words of the standard about a workitem that already is in the requested state.
 std::string already_in(store::WorkitemState state);
 
 // The attributes in a record; empty if it is damaged, which is reported.

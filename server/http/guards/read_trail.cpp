@@ -46,13 +46,15 @@ ReadTrail::ReadTrail(const Stores& stores, std::chrono::milliseconds window)
         while (!stop.stop_requested()) {
           pause(stop, between);
           const Lock lock(mutex_);
-          close_windows(stop.stop_requested() ? Clock::time_point::max() : Clock::now());
+          close_windows(Clock::now());
         }
       }) {}
 
 ReadTrail::~ReadTrail() {
   closing_.request_stop();
   closing_.join();
+  const Lock lock(mutex_);
+  close_windows(Clock::time_point::max());
 }
 
 // Every route below a volume or a job tells about its patient, except a job's state and events.

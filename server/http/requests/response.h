@@ -29,7 +29,7 @@ struct StreamedBody {
   std::uint64_t length = 0;  // with kLength: the source's bytes, not 0
 };
 
-// What a response tells about a patient, for the audit trail, if it belongs to no volume and no
+// The patient about whom a response tells, for the audit trail, if it belongs to no volume and no
 // job.
 struct ToldPatient {
   std::string what;  // "workitem"

@@ -74,7 +74,7 @@ class WallFans {
   static std::uint64_t bytes(std::uint64_t vertices, std::uint64_t triangles);
 
  private:
-  // Of its other corners: around the vertex, from one end to the other, or by triangle.
+  // The numbers of its other corners: around the vertex, from one end to the other, or by triangle.
   enum class Kind : std::uint8_t { kClosed, kOpen, kLoose };
   struct Corner;
   struct Layer;

@@ -93,10 +93,10 @@ inline constexpr std::size_t kAboveRun = 2;
 
 // Moves the vertices of a run of layers by all steps of a round, as the layers come, and those
 // around the run as far as they matter to it. In the last round, vertices of triangles without area
-// are put back. What a run makes does not depend on where it is cut.
+// are put back. Results do not depend on where a run is cut.
 class LayerSteps {
  public:
-  // `layers` are those of `around(run)`. What these refer to must outlive it.
+  // `layers` are those of `around(run)`. The objects that these refer to must outlive it.
   LayerSteps(const Round& round, const LayerRange& run, SmoothedLayers layers);
   ~LayerSteps();
 

@@ -19,7 +19,7 @@ inline nlohmann::json code(const std::string& value) {
           {"00080104", attribute("LO", value)}};
 }
 
-// What POST /workitems accepts.
+// A data set that POST /workitems accepts.
 inline worklist::DataSet scheduled() {
   using worklist::attribute;
   return {{"00741000", attribute("CS", "SCHEDULED")},

@@ -28,7 +28,7 @@ WorkitemRecord claimed() {
   return record;
 }
 
-// What a performer tells before the workitem can be completed.
+// A performer tells this before the workitem can be completed.
 DataSet performed() {
   return {{"00741216", attribute("SQ", {{"00404028", attribute("SQ", test::code("isomesh"))},
                                         {"00404019", attribute("SQ", test::code("MESH"))},

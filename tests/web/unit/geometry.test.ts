@@ -28,7 +28,7 @@ describe('geometry', () => {
         const columns = order.split(',').map((name) => axisDirection({ direction }, 'xyz'.indexOf(name.slice(-1))).map((part) => (name.startsWith('-') ? -part : part)));
         return { direction: [0, 1, 2].flatMap((row) => columns.map((column) => column[row] as number)) };
       };
-      // Where the end of an axis comes to lie, by the side where it lay.
+      // The side where the end of an axis comes to lie, by the side where it lay.
       const moved = (order: string): string[] => [0, 1, 2].map((axis) => sideOf(axisDirection({ direction }, axis)) + sideOf(axisDirection(corrected(order), axis)));
       for (const pair of moved(flipped({ direction }, 0))) expect('LR RL AA PP SS II').toContain(pair);
       for (const pair of moved(flipped({ direction }, 2))) expect('LL RR AA PP SI IS').toContain(pair);

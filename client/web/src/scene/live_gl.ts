@@ -33,7 +33,7 @@ import { Painting } from './painting';
 export interface LiveScene {
   preview: Preview;
   camera: PerspectiveCamera;
-  // What the camera looks at, in millimetres.
+  // The point that the camera looks at, in millimetres.
   target: Vector3;
   // In parts of the preview's window.
   iso: number;
@@ -42,18 +42,18 @@ export interface LiveScene {
   // The surface at the iso-value, a look through the samples, or labels by the look's colours.
   kind: keyof typeof kinds;
   look: Look | null;
-  // What of the volume is drawn, in parts of its samples along each axis; null for all of it.
+  // The part of the volume that is drawn, in parts of its samples along each axis; null for all of it.
   crop: readonly [Vector3, Vector3] | null;
-  // Where the slices meet, in millimetres; lines through it are drawn over the surface.
+  // The point where the slices meet, in millimetres; lines through it are drawn over the surface.
   cursor: Vector3 | null;
 }
 
 // In pixels of the screen.
 export interface LivePicture {
-  // Of the canvas.
+  // The size of the canvas.
   wide: number;
   high: number;
-  // Of what is painted, which is enlarged to the canvas.
+  // The size of what is painted, which is enlarged to the canvas.
   width: number;
   height: number;
   // It is painted in so many, and a change ends it after one of them.
@@ -65,7 +65,7 @@ const surfaceColour = new Vector3(0.86, 0.84, 0.78);
 const crossColour = '#2ce0cb';
 const crossOpacity = 0.45;
 
-// Where samples of the preview lie in the patient.
+// The places of the preview's samples in the patient.
 export function placeOfSamples({ steps: [x, y, z], origin: [ox, oy, oz] }: Preview): Matrix4 {
   return new Matrix4().set(x[0], y[0], z[0], ox, x[1], y[1], z[1], oy, x[2], y[2], z[2], oz, 0, 0, 0, 1);
 }
@@ -155,7 +155,7 @@ export class GlPainter {
   readonly canvas: HTMLCanvasElement;
   // Software draws.
   readonly isSoftware: boolean;
-  // What it paints with is there.
+  // All that it paints with is there.
   readonly ready: Promise<void>;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();

@@ -80,7 +80,7 @@ vec2 rangeAt(ivec3 block) { return texelFetch(blocks, block, 0).rg; }
 // The colour and opacity of a value.
 vec4 tableAt(int value) { return texelFetch(look, ivec2(value, 0), 0); }
 vec4 tableBetween(float value) { return texture(look, vec2((255.0 * value + 0.5) / 256.0, 0.5)); }
-// Of the opacities of all values below.
+// The sum of the opacities of all values below.
 float sumAt(int value) { return texelFetch(sums, ivec2(value, 0), 0).r; }
 
 const int mostSteps = 2048;

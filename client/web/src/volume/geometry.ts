@@ -137,7 +137,7 @@ export function flipped(volume: Directed, patientAxis: 0 | 1 | 2): string {
   return axes.map((each) => (each === axis ? `-${each}` : each)).join();
 }
 
-// What stands at the right of a slice then stands at its bottom.
+// The right of a slice becomes its bottom.
 export function turned(volume: Directed, plane: Plane): string {
   const { right, down } = slicePlane(volume, plane);
   const order: string[] = [...axes];
