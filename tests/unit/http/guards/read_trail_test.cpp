@@ -139,6 +139,18 @@ TEST_F(ReadTrailTest, EntersACountWhenItsWindowEnds) {
   EXPECT_THAT(entries(), SizeIs(3));
 }
 
+// Its thread may not have begun.
+TEST_F(ReadTrailTest, EntersACountHoweverEarlyItEnds) {
+  for (std::size_t times = 1; times <= 10; ++times) {
+    trail_.reset();
+    open(kLong);
+    note(kSlice, "head");
+    note(kSlice, "head");
+    trail_.reset();
+    EXPECT_THAT(entries(), SizeIs(2 * times));
+  }
+}
+
 TEST_F(ReadTrailTest, KeepsTheMeshOfAnErasedVolume) {
   services_.jobs().cancel("ann", job_);
   services_.volumes().erase("ann", "head", store::Made::kKept, {});
