@@ -100,7 +100,11 @@ class OpenHospital {
                      },
                  .forget_also = [this](store::Time before) { return workitems_.forget(before); }}) {
     if (settings_.worklist) {
-      worklist_.emplace(OwnWorklist{.settings = *settings_.worklist, .workitems = workitems_});
+      worklist_.emplace(OwnWorklist{.settings = *settings_.worklist,
+                                    .workitems = workitems_,
+                                    .cancel_performing = [this](const std::string& transaction) {
+                                      return orders_.cancel_performing(transaction);
+                                    }});
     }
     if (!settings_.dimse) return;
     listener_ = std::make_unique<c_store::DimseListener>(

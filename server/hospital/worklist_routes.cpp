@@ -167,6 +167,11 @@ void search(const OwnWorklist* worklist, const Request& request, Response& respo
   response.set_header("Cache-Control", "no-store");
 }
 
+void answer_change(const Request& request, Response& response, int status) {
+  response.status = status;
+  response.set_header("Content-Location", kWorkitemsPath + '/' + request.path_parameter("uid"));
+}
+
 // Changes the workitem of the path and answers with that status.
 void change(const OwnWorklist& list, const Request& request, Response& response, int status,
             const std::function<std::string(WorkitemRecord&)>& act) {
@@ -177,8 +182,7 @@ void change(const OwnWorklist& list, const Request& request, Response& response,
   });
   if (!is_there) throw unknown_workitem();
   warn(response, warning);
-  response.status = status;
-  response.set_header("Content-Location", kWorkitemsPath + '/' + request.path_parameter("uid"));
+  answer_change(request, response, status);
 }
 
 void update(App& app, const OwnWorklist* worklist, const Request& request, Response& response) {
@@ -211,6 +215,11 @@ void request_cancellation(App& app, const OwnWorklist* worklist, const Request& 
   check_requester(list, request);
   const std::string body = request.content_length == 0 ? "" : workitem_body(app, request);
   const worklist::DataSet reason = worklist::parse_data_set(body.empty() ? "{}" : body);
+  const auto known = list.workitems.find(request.path_parameter("uid"));
+  if (known && known->state == store::WorkitemState::kInProgress &&
+      list.cancel_performing(known->transaction)) {
+    return answer_change(request, response, 202);
+  }
   change(list, request, response, 202,
          [&](WorkitemRecord& record) { return worklist::cancel(record, reason, time_now()); });
 }

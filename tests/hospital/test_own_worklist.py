@@ -118,6 +118,25 @@ class OwnWorklist(Loop):
             self.reaches(daemon, uid, "COMPLETED")
             self.assert_performed(daemon, daemon, uid, each)
 
+    def test_a_request_cancels_its_own(self):
+        """A performer of the same daemon hears of a request; a second one changes nothing."""
+        way = peers.Proxy(0)
+        self.addCleanup(way.close)
+        held = self.series()
+        self.proxy.fault = lambda _, path, __: (503, {}, b"") if held.uid in path else None
+        daemon = self.daemon(rules=RULE.format(port=way.port) + "[worklist]")
+        way.target = daemon.port
+        uid = self.scheduled(daemon, held)
+        self.reaches(daemon, uid, "IN PROGRESS")
+        for _ in range(2):
+            self.assertEqual(self.ask(daemon, "POST", f"/{uid}/cancelrequest")[0], 202)
+        self.reaches(daemon, uid, "CANCELED")
+        order, = daemon.call("GET", "/v1/orders")[2]["orders"]
+        self.assertEqual(daemon.ended(order["id"])["state"], "cancelled")
+        status, warning, _ = self.ask(daemon, "POST", f"/{uid}/cancelrequest")
+        self.assertEqual((status, warning), (202, "The UPS is already in the requested state of "
+                                                  "CANCELED."))
+
     def test_a_failure_and_a_cancellation(self):
         """A workitem that nobody performs is cancelled here; one that isomesh performs, by its order."""
         listing = self.daemon(rules="[worklist]")

@@ -186,6 +186,18 @@ Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
   return order;
 }
 
+bool Orders::cancel_performing(const std::string& transaction) {
+  constexpr std::chrono::hours kEver{100'000};  // also those that wait
+  const auto open = services_.orders.due(options_.now() + kEver, settings_.most_open);
+  const auto found = std::ranges::find_if(open, [&](const store::OrderRecord& record) {
+    return record.work.workitem && record.work.workitem->transaction == transaction;
+  });
+  if (found == open.end()) return false;
+  // An order that is cancelled twice would not tell the worklist.
+  if (!found->work.workitem->ending) cancel(store::Viewer(), found->order.id);
+  return true;
+}
+
 Order Orders::retry(const store::Viewer& viewer, const std::string& id) {
   Order order = services_.orders.retry(viewer, id);
   changed();

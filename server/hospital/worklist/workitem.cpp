@@ -298,8 +298,8 @@ std::string cancel(WorkitemRecord& record, const DataSet& request, store::Time n
                     "The UPS is already COMPLETED.");
     case WorkitemState::kInProgress:
       throw Refusal(ErrorCode::kNotReady,
-                    "the workitem is IN PROGRESS, and this worklist cannot tell its performer: ask "
-                    "there",
+                    "the workitem is IN PROGRESS, and this worklist cannot tell its performer, which "
+                    "is no order of isomesh: ask there",
                     "The performer cannot be contacted.");
     case WorkitemState::kScheduled:
       break;
