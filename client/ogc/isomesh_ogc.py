@@ -1,15 +1,17 @@
 """OGC API - Processes, Part 1: Core 1.0 (OGC 18-062r2) in front of an isomesh daemon: one process, `mesh`.
 
-    python3 isomesh_ogc.py [--port 8090] [--server http://127.0.0.1:8080]
+    python3 isomesh_ogc.py [--port 8090] [--server http://127.0.0.1:8080] [--url https://ogc.example.org]
 
 It keeps nothing: jobs are the daemon's, and so are the rights. `Authorization` is passed on. A job's number ends with the form of
 its results that the execute request asked for.
 """
 
 import argparse
+import http.client
 import json
 import re
 import urllib.error
+import urllib.parse
 import urllib.request
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -39,13 +41,15 @@ INPUTS = {
         0,
     ),
 }
+REFERENCE = {"transmissionMode": "reference"}
 MESH = {"title": "The mesh", "schema": {"type": "string", "format": "binary"}}
 
 
 class Failure(Exception):
-    def __init__(self, status, title, detail="", kind="about:blank"):
+    def __init__(self, status, title, detail="", kind="about:blank", headers=None):
         super().__init__(title)
         self.status = status
+        self.headers = headers or {}
         self.problem = {"type": kind, "title": title, "status": status, "detail": detail}
 
 
@@ -86,8 +90,11 @@ class Handler(BaseHTTPRequestHandler):
     def _answer(self, routes):
         try:
             # A name that a stranger's DNS leads to this machine.
-            if self.headers.get("Host", "").partition(":")[0] not in self.server.names:
-                raise Failure(421, "Unknown host", "Start the service with --host NAME if clients know it by this name.")
+            if urllib.parse.urlsplit("//" + self.headers.get("Host", "")).hostname not in self.server.names:
+                raise Failure(421, "Unknown host", "Start the service with --url ADDRESS if clients know it by another name.")
+            # What is left of an unread body would be taken for the next request.
+            if "Transfer-Encoding" in self.headers or (self.command != "POST" and self.headers.get("Content-Length", "0") != "0"):
+                raise Failure(400, "Unexpected body", "Only POST has a body, and that has a Content-Length.")
             path = self.path.partition("?")[0]
             for pattern, run in routes.items():
                 found = re.fullmatch(pattern, path)
@@ -97,7 +104,7 @@ class Handler(BaseHTTPRequestHandler):
             kind = "no-such-job" if path.startswith("/jobs/") else "no-such-process" if path.startswith("/processes/") else "not-found"
             raise Failure(404, "Not found", f"There is no {path}.", EXCEPTION + kind)
         except Failure as failure:
-            self._send(failure.status, failure.problem, {"Content-Type": PROBLEM})
+            self._send(failure.status, failure.problem, {"Content-Type": PROBLEM, **failure.headers})
 
     def _send(self, status, value=None, headers=None):
         body = b"" if value is None else json.dumps(value).encode()
@@ -126,12 +133,14 @@ class Handler(BaseHTTPRequestHandler):
             with error:
                 problem = json.loads(error.read() or b"{}") if PROBLEM in error.headers.get("Content-Type", "") else {}
             kind = missing if error.code == 404 and missing else problem.get("type", "about:blank")
-            raise Failure(error.code, problem.get("title", error.reason), problem.get("detail", ""), kind) from None
-        except OSError as error:
-            raise Failure(502, "The daemon does not respond", str(error)) from None
+            kept = {name: error.headers[name] for name in ("WWW-Authenticate", "Retry-After") if name in error.headers}
+            raise Failure(error.code, problem.get("title", error.reason), problem.get("detail", ""), kind, kept) from None
+        except (OSError, ValueError, http.client.HTTPException) as error:
+            raise Failure(502, "The daemon does not respond as one", str(error)) from None
 
     def _link(self, path, relation, kind=JSON):
-        return {"href": f"http://{self.headers.get('Host', 'localhost')}{path}", "rel": relation, "type": kind}
+        base = self.server.url or f"http://{self.headers['Host']}"
+        return {"href": base + path, "rel": relation, "type": kind}
 
     def _landing(self):
         links = [
@@ -153,8 +162,10 @@ class Handler(BaseHTTPRequestHandler):
         if self.headers.get_content_type() != JSON:
             raise Failure(415, "Not JSON", f"The request's Content-Type must be {JSON}.")
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > LARGEST_REQUEST:
-            raise Failure(413 if length.isdecimal() else 411, "The request needs a length", f"At most {LARGEST_REQUEST} bytes are read.")
+        if not re.fullmatch("[0-9]+", length):
+            raise Failure(411, "The request needs a length", "Its header Content-Length is missing.")
+        if len(length) > len(str(LARGEST_REQUEST)) or int(length) > LARGEST_REQUEST:
+            raise Failure(413, "The request is too large", f"At most {LARGEST_REQUEST} bytes are read.")
         try:
             request = json.loads(self.rfile.read(int(length)))
         except (ValueError, RecursionError) as error:
@@ -168,8 +179,13 @@ class Handler(BaseHTTPRequestHandler):
         form = request.get("response", "raw")
         if unknown or missing or not isinstance(parameters, dict) or {"volume", "formats"} & set(parameters):
             raise Failure(400, "Wrong inputs", f"Unknown: {unknown}. Missing: {missing}. parameters is an object without volume and formats.")
+        formats = INPUTS["format"][1]["enum"]
+        if inputs["format"] not in formats:
+            raise Failure(400, "Wrong format", f"format is one of {', '.join(formats)}.")
         if form not in ("raw", "document"):
             raise Failure(400, "Wrong response", "response is raw or document.")
+        if request.get("outputs", {}) not in ({}, {"mesh": {}}, {"mesh": REFERENCE}):
+            raise Failure(400, "Wrong outputs", "The only output is mesh, and its transmissionMode is reference.")
         job = self._daemon("POST", "/v1/jobs", {**parameters, "volume": inputs["volume"], "formats": [inputs["format"]]})
         status = self._status(job, form)
         self._send(201, status, {"Location": self._link(f"/jobs/{status['jobID']}", "self")["href"], "Preference-Applied": "respond-async"})
@@ -201,8 +217,12 @@ class Handler(BaseHTTPRequestHandler):
         if made["state"] != "succeeded":
             error = made.get("error") or {}
             raise Failure(error.get("status", 410), f"The job is {made['state']}", error.get("detail", ""), error.get("type", "about:blank"))
-        ((_, file),) = made["mesh"]["files"].items()
-        address = self.server.daemon + file["href"]
+        # Beside the format there may be an archive: of labels, for formats that hold one label.
+        files = made["mesh"]["files"]
+        asked = files.get(made["parameters"]["formats"][0]) or next(iter(files.values()), None)
+        if asked is None:
+            raise Failure(404, "The surface is empty", "So there is no file.", EXCEPTION + "result-not-ready")
+        address = self.server.daemon + asked["href"]
         if form == "document":
             self._send(200, {"mesh": {"href": address}})
         else:
@@ -213,10 +233,11 @@ class Handler(BaseHTTPRequestHandler):
         self._send(200, self._status(made, form))
 
 
-def serve(port, daemon, names=()):
+def serve(port, daemon, url=""):
     server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
     server.daemon = daemon.rstrip("/")
-    server.names = {"localhost", "127.0.0.1", *names}
+    server.url = url.rstrip("/")
+    server.names = {"localhost", "127.0.0.1", urllib.parse.urlsplit(url).hostname} - {None}
     return server
 
 
@@ -224,8 +245,8 @@ if __name__ == "__main__":
     options = argparse.ArgumentParser(description="OGC API - Processes in front of an isomesh daemon")
     options.add_argument("--port", type=int, default=8090)
     options.add_argument("--server", default="http://127.0.0.1:8080", help="the daemon's address, which clients get for results")
-    options.add_argument("--host", action="append", default=[], help="another name of this service, as a proxy in front of it passes on; repeatable")
+    options.add_argument("--url", default="", help="the address of this service for clients, if a proxy stands in front of it")
     given = options.parse_args()
-    with serve(given.port, given.server, given.host) as running:
+    with serve(given.port, given.server, given.url) as running:
         print(f"listening on http://127.0.0.1:{running.server_port}", flush=True)
         running.serve_forever()

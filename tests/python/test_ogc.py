@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import socket
 import threading
 import urllib.error
 import urllib.request
@@ -70,6 +71,40 @@ class Processes(DaemonTest):
         self.assertEqual((status, body), (204, None))
         self.assertRegex(headers["Link"], r'^<http.*mesh\.stl>; rel="mesh"$')
 
+    def test_labels_have_the_file_of_their_format(self):
+        samples = numpy.zeros((12, 12, 12), "uint8")
+        samples[2:5, 2:5, 2:5] = 1
+        samples[7:10, 7:10, 7:10] = 2
+        volume = self.client.upload(samples)["id"]
+        for form, end in (("obj", "mesh.obj"), ("glb", "mesh.glb"), ("stl", "mesh.zip")):
+            inputs = {"volume": volume, "format": form, "parameters": {"labels": "all"}}
+            _, headers, job = self.ask("/processes/mesh/execution", {"inputs": inputs, "response": "document"})
+            location = headers["Location"]
+            self.ended(location, job)
+            mesh = self.ask(location + "/results")[2]["mesh"]["href"]
+            self.assertTrue(mesh.endswith(end), mesh)
+            with urllib.request.urlopen(mesh, timeout=30) as response:
+                self.assertGreater(len(response.read()), 100)
+
+    def test_a_proxy_may_stand_in_front(self):
+        self.ogc.url = "https://ogc.example.org"
+        self.ogc.names.add("ogc.example.org")
+        address = f"http://127.0.0.1:{self.ogc.server_port}/"
+        with urllib.request.urlopen(urllib.request.Request(address, headers={"Host": "OGC.example.org:443"}), timeout=30) as response:
+            links = json.load(response)["links"]
+        self.assertEqual(links[1]["href"], "https://ogc.example.org/conformance")
+
+    def test_a_body_is_no_second_request(self):
+        inner = b"GET /conformance HTTP/1.1\r\nHost: localhost\r\n\r\n"
+        heads = (f"Content-Length: {len(inner)}", "Transfer-Encoding: chunked", "Content-Length: " + "9" * 5000)
+        for head in heads:
+            with socket.create_connection(("127.0.0.1", self.ogc.server_port), timeout=30) as connection:
+                connection.sendall(f"GET / HTTP/1.1\r\nHost: localhost\r\n{head}\r\n\r\n".encode() + inner)
+                connection.shutdown(socket.SHUT_WR)
+                answer = b"".join(iter(lambda: connection.recv(65536), b""))
+            self.assertEqual(answer.count(b"HTTP/1.1 "), 1)
+            self.assertTrue(answer.startswith(b"HTTP/1.1 400 "), answer)
+
     def test_what_is_wrong_has_the_types_of_the_standard(self):
         for path, kind in (
             ("/processes/other", "no-such-process"),
@@ -84,6 +119,8 @@ class Processes(DaemonTest):
             status, _, problem = self.ask("/processes/mesh/execution", value)
             self.assertEqual(status, 400)
             self.assertIn(word, problem["detail"])
+        for more in ({"inputs": {**inputs, "format": "usda"}}, {"outputs": {"other": {}}}, {"outputs": {"mesh": {"transmissionMode": "value"}}}):
+            self.assertEqual(self.ask("/processes/mesh/execution", {"inputs": inputs, **more})[0], 400, more)
         volume = self.client.upload(ball())["id"]
         status, _, problem = self.ask("/processes/mesh/execution", {"inputs": {**inputs, "volume": volume, "parameters": {"iso": "high"}}})
         self.assertEqual(status, 400)
