@@ -62,7 +62,11 @@ std::optional<ReadTrail::Reading> ReadTrail::reading_of(const Request& request,
                                                         const Response& response) {
   constexpr std::string_view kVolume = "/v1/volumes/{id}";
   constexpr std::string_view kJob = "/v1/jobs/{id}";
-  if (request.method != "GET" && request.method != "HEAD") return std::nullopt;
+  const std::string_view route = request.context.route;
+  // These respond with the volume and its patient.
+  const bool has_details = (request.method == "PATCH" && route == "/v1/volumes/{id}") ||
+                           (request.method == "POST" && route == "/v1/volumes/{id}/reoriented");
+  if (request.method != "GET" && request.method != "HEAD" && !has_details) return std::nullopt;
   if (!is_read(response.status) && !is_refused(response.status)) return std::nullopt;
   if (response.told) {
     return Reading{.caller = request.context.caller.name,
@@ -72,12 +76,11 @@ std::optional<ReadTrail::Reading> ReadTrail::reading_of(const Request& request,
                    .success = is_read(response.status),
                    .told = response.told};
   }
-  const std::string_view route = request.context.route;
   const bool is_of_job = route.starts_with(kJob);
   if (!is_of_job && !route.starts_with(kVolume)) return std::nullopt;
   std::string_view what = route.substr((is_of_job ? kJob : kVolume).size());
   if (is_of_job && (what.empty() || what == "/events")) return std::nullopt;
-  what = what.empty() ? "volume" : what.substr(1);
+  what = what.empty() || has_details ? "volume" : what.substr(1);
   return Reading{.caller = request.context.caller.name,
                  .address = request.remote_address,
                  .is_of_job = is_of_job,

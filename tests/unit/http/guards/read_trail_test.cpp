@@ -97,6 +97,13 @@ TEST_F(ReadTrailTest, NamesReaderPatientAndData) {
                                      "110112 success - 192.0.2.5 report head 1.2.3 PAT1 1"));
 }
 
+TEST_F(ReadTrailTest, NamesWhoGetsAVolumeByChangingIt) {
+  note("/v1/volumes/{id}", "head", 200, "ann", "PATCH");
+  note("/v1/volumes/{id}/reoriented", "head", 201, "bob", "POST");
+  EXPECT_THAT(entries(), ElementsAre("110112 success ann 192.0.2.5 volume head 1.2.3 PAT1 1",
+                                     "110112 success bob 192.0.2.5 volume head 1.2.3 PAT1 1"));
+}
+
 TEST_F(ReadTrailTest, NamesWhoTriedInVain) {
   note("/v1/volumes/{id}", "head", 404, "bob");
   note("/v1/jobs/{id}/mesh.{format}", job_, 403, "bob");
