@@ -187,6 +187,7 @@ void change(const OwnWorklist& list, const Request& request, Response& response,
 
 void update(App& app, const OwnWorklist* worklist, const Request& request, Response& response) {
   const OwnWorklist& list = configured(worklist);
+  check_reader(list, request);  // a login without rights learns nothing
   const std::string transaction = uid_in_query(request);
   const worklist::DataSet changes = worklist::parse_data_set(workitem_body(app, request));
   change(list, request, response, 200, [&](WorkitemRecord& record) {

@@ -5,6 +5,17 @@ namespace {
 
 char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
+// The bytes of the character at that place, in UTF-8.
+std::size_t character_bytes(std::string_view text, std::size_t at) {
+  constexpr unsigned kMask = 0xC0;
+  constexpr unsigned kContinuation = 0x80;
+  std::size_t end = at + 1;
+  while (end < text.size() && (static_cast<unsigned char>(text[end]) & kMask) == kContinuation) {
+    ++end;
+  }
+  return end - at;
+}
+
 }  // namespace
 
 bool matches(std::string_view pattern, std::string_view text) {
@@ -18,8 +29,10 @@ bool matches(std::string_view pattern, std::string_view text) {
     if (p < pattern.size() && pattern[p] == '*') {
       star = p++;
       star_text = t;
-    } else if (p < pattern.size() &&
-               (pattern[p] == '?' || lower_of(pattern[p]) == lower_of(text[t]))) {
+    } else if (p < pattern.size() && pattern[p] == '?') {
+      ++p;
+      t += character_bytes(text, t);
+    } else if (p < pattern.size() && lower_of(pattern[p]) == lower_of(text[t])) {
       ++p;
       ++t;
     } else if (star != std::string_view::npos) {

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <chrono>
 #include <string_view>
 
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "server/hospital/orders/pattern.h"
@@ -88,26 +91,63 @@ std::string_view without_zone(std::string_view moment) {
   return is_zone ? moment.substr(0, moment.size() - 5) : moment;
 }
 
-// Compares as far as both are given: 2026 is before 20270101, and the same as 20261231.
-int compared(std::string_view left, std::string_view right) {
-  left = without_zone(left);
-  right = without_zone(right);
+int number_at(std::string_view digits, std::size_t from, std::size_t count) {
+  int number = 0;
+  std::from_chars(digits.data() + from, digits.data() + from + count, number);
+  return number;
+}
+
+// A moment with a zone in UTC, as precisely as it is given; a day stays as it is, without its zone.
+std::string in_utc(std::string_view moment) {
+  constexpr std::size_t kToHour = 10;
+  constexpr std::size_t kToMinute = 12;
+  const std::string_view bare = without_zone(moment);
+  if (bare.size() < kToHour || bare.find_first_not_of("0123456789.") != bare.npos) {
+    return std::string(bare);
+  }
+  const std::string_view zone = moment.substr(bare.size());
+  const std::chrono::minutes east =
+      std::chrono::hours(number_at(zone, 1, 2)) + std::chrono::minutes(number_at(zone, 3, 2));
+  const std::size_t known = bare.size() < kToMinute ? kToHour : kToMinute;
+  const std::chrono::year_month_day day(
+      std::chrono::year(number_at(bare, 0, 4)),
+      std::chrono::month(static_cast<unsigned>(number_at(bare, 4, 2))),
+      std::chrono::day(static_cast<unsigned>(number_at(bare, 6, 2))));
+  if (!day.ok()) return std::string(bare);
+  const auto time = std::chrono::sys_days(day) + std::chrono::hours(number_at(bare, 8, 2)) +
+                    std::chrono::minutes(known == kToMinute ? number_at(bare, kToHour, 2) : 0) -
+                    (zone.front() == '-' ? -east : east);
+  return utc_text(time, "%Y%m%d%H%M").substr(0, known) + std::string(bare.substr(known));
+}
+
+bool has_zone(std::string_view moment) { return without_zone(moment).size() < moment.size(); }
+
+// Compares as far as both are given: 2026 is before 20270101, and the same as 20261231. Nobody
+// knows the zone of a moment without one, so it is compared as it is written.
+int compared(std::string_view left_moment, std::string_view right_moment) {
+  const bool have_zones = has_zone(left_moment) && has_zone(right_moment);
+  const auto text = [&](std::string_view moment) {
+    return have_zones ? in_utc(moment) : std::string(without_zone(moment));
+  };
+  const std::string left = text(left_moment);
+  const std::string right = text(right_moment);
   const std::size_t length = std::min(left.size(), right.size());
-  return left.substr(0, length).compare(right.substr(0, length));
+  return left.compare(0, length, right, 0, length);
 }
 
 // PS3.4, C.2.2.2.5: one moment, or a range with a hyphen.
 bool is_in_range(std::string_view wanted, std::string_view moment) {
-  const std::string_view bare = without_zone(wanted);
-  std::size_t hyphen = bare.find('-');
-  // The hyphen of a zone within a range is followed by another.
-  if (hyphen != bare.npos && without_zone(bare.substr(0, hyphen + 5)) == bare.substr(0, hyphen) &&
-      bare.find('-', hyphen + 1) != bare.npos) {
-    hyphen = bare.find('-', hyphen + 1);
-  }
-  if (hyphen == bare.npos) return compared(bare, moment) == 0;
-  const std::string_view from = bare.substr(0, hyphen);
-  const std::string_view to = bare.substr(hyphen + 1);
+  // The hyphen of a zone has its digits behind it, and then that of the range or the end.
+  const auto is_of_zone = [&](std::size_t hyphen) {
+    const std::size_t end = hyphen + 5;
+    return end <= wanted.size() && (end == wanted.size() || wanted[end] == '-') &&
+           without_zone(wanted.substr(0, end)).size() == hyphen;
+  };
+  std::size_t hyphen = wanted.find('-');
+  while (hyphen != wanted.npos && is_of_zone(hyphen)) hyphen = wanted.find('-', hyphen + 1);
+  if (hyphen == wanted.npos) return compared(wanted, moment) == 0;
+  const std::string_view from = wanted.substr(0, hyphen);
+  const std::string_view to = wanted.substr(hyphen + 1);
   return (from.empty() || compared(from, moment) <= 0) && (to.empty() || compared(moment, to) <= 0);
 }
 

@@ -57,6 +57,12 @@ void check_empty(const DataSet& data, const char* tag, const std::string& messag
   if (!values_of(data, tag).empty()) throw invalid_parameter(tag, message);
 }
 
+void check_required(const DataSet& data) {
+  for (const char* tag : {kStart, kStepLabel}) {
+    if (text_of(data, tag).empty()) throw invalid_parameter(tag, "is required");
+  }
+}
+
 // Writes the data into the record, with its state and the time of this change.
 void store_in(WorkitemRecord& record, DataSet& data, store::Time now) {
   data[kState] = attribute("CS", to_string(record.state));
@@ -218,9 +224,7 @@ WorkitemRecord new_workitem(const std::string& uid, DataSet data, store::Time no
   }
   check_choice(data, kPriority, {"HIGH", "MEDIUM", "LOW"});
   check_choice(data, kReadiness, {"INCOMPLETE", "UNAVAILABLE", "READY"});
-  for (const char* tag : {kStart, kStepLabel}) {
-    if (text_of(data, tag).empty()) throw invalid_parameter(tag, "is required");
-  }
+  check_required(data);
   data.erase(kTransaction);
   data[kSopClass] = attribute("UI", kUpsPush);
   data[kSopInstance] = attribute("UI", record.uid);
@@ -259,6 +263,7 @@ void update(WorkitemRecord& record, DataSet changes, const std::string& transact
   }
   check_choice(data, kPriority, {"HIGH", "MEDIUM", "LOW"});
   check_choice(data, kReadiness, {"INCOMPLETE", "UNAVAILABLE", "READY"});
+  check_required(data);
   store_in(record, data, now);
 }
 
@@ -297,10 +302,11 @@ std::string cancel(WorkitemRecord& record, const DataSet& request, store::Time n
       throw Refusal(ErrorCode::kNotReady, "the workitem is COMPLETED",
                     "The UPS is already COMPLETED.");
     case WorkitemState::kInProgress:
-      throw Refusal(ErrorCode::kNotReady,
-                    "the workitem is IN PROGRESS, and this worklist cannot tell its performer, which "
-                    "is no order of isomesh: ask there",
-                    "The performer cannot be contacted.");
+      throw Refusal(
+          ErrorCode::kNotReady,
+          "the workitem is IN PROGRESS, and this worklist cannot tell its performer, which "
+          "is no order of isomesh: ask there",
+          "The performer cannot be contacted.");
     case WorkitemState::kScheduled:
       break;
   }

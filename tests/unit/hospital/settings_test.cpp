@@ -246,6 +246,8 @@ TEST(HospitalSettings, RefusalsDoNotRepeatValues) {
 TEST(Matches, StarsAndQuestionMarks) {
   EXPECT_TRUE(matches("*bone*", "Head BONE 1mm"));
   EXPECT_TRUE(matches("head ?mm", "Head 1mm"));
+  EXPECT_TRUE(matches("M?rz*", "M\u00e4rz 2026"));
+  EXPECT_FALSE(matches("M??rz", "M\u00e4rz"));
   EXPECT_TRUE(matches("*", ""));
   EXPECT_TRUE(matches("a*b*c", "aXbYbZc"));
   EXPECT_FALSE(matches("bone", "Head bone"));

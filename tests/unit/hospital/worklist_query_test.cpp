@@ -53,6 +53,21 @@ TEST(WorklistQuery, MatchesByKindOfValue) {
   }
 }
 
+TEST(WorklistQuery, ComparesMomentsOfAllZones) {
+  DataSet data = data_of(test::new_record());
+  const auto finds = [&](const std::string& moment, const std::string& wanted) {
+    data["00404005"]["Value"] = {moment};
+    return matches(parse_query({{"ScheduledProcedureStepStartDateTime", wanted}}), data);
+  };
+  EXPECT_TRUE(finds("20260102230000-0500", "20260103033000+0000-20260103043000+0000"));
+  EXPECT_TRUE(finds("20260102230000-0500", "20260103040000+0000"));
+  EXPECT_TRUE(finds("20260102230000-0500", "20260103053000+0130"));
+  EXPECT_TRUE(finds("20260102230000-0500", "2026010304+0000-"));
+  EXPECT_TRUE(finds("20260103003015.5+0100", "-20260102233015.5+0000"));
+  EXPECT_FALSE(finds("20260102230000-0500", "20260102230000+0000"));
+  EXPECT_FALSE(finds("20260102230000-0500", "-20260103035900+0000"));
+}
+
 TEST(WorklistQuery, KnowsWhatItDoesNotSearchFor) {
   for (const auto& [name, value] : {
            std::pair<std::string, std::string>{"PatientsName", "x"},
