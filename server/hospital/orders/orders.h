@@ -70,8 +70,8 @@ class Orders {
   }
   Order cancel(const store::Viewer& viewer, const std::string& id);
   Order retry(const store::Viewer& viewer, const std::string& id);
-  // Cancels the open order that claimed a workitem with that Transaction UID. Returns false if there
-  // is none.
+  // Cancels the open order that claimed a workitem with that Transaction UID. Returns false if
+  // there is none.
   bool cancel_performing(const std::string& transaction);
 
   std::vector<Order> list(const store::Viewer& viewer, const store::OrderFilter& filter,
