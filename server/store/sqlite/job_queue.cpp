@@ -96,7 +96,7 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
     row.accepted = now_us();
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;
-    row.job.created = timestamp();
+    row.job.created = timestamp_of(from_us(row.accepted));
     const auto mesh = made ? made->mesh : std::nullopt;
     const bool is_current = mesh ? has_succeeded(change.connection(), made->job)
                                  : latest_like(change.connection(), row) == (made ? made->job : "");
