@@ -92,7 +92,7 @@ class Handler(BaseHTTPRequestHandler):
             # A name that a stranger's DNS leads to this machine.
             if urllib.parse.urlsplit("//" + self.headers.get("Host", "")).hostname not in self.server.names:
                 raise Failure(421, "Unknown host", "Start the service with --url ADDRESS if clients know it by another name.")
-            # What is left of an unread body would be taken for the next request.
+            # An unread body would be taken for the next request.
             if "Transfer-Encoding" in self.headers or (self.command != "POST" and self.headers.get("Content-Length", "0") != "0"):
                 raise Failure(400, "Unexpected body", "Only POST has a body, and that has a Content-Length.")
             path = self.path.partition("?")[0]

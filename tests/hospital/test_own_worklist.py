@@ -10,22 +10,10 @@ import time
 import peers
 import worklist
 from fixture import ISOMESHD, Loop
-from worklist import STATE, TRANSACTION, code, sequence, value
+from worklist import RULE, STATE, TRANSACTION, code, sequence, value
 
-RULE = """
-[[pacs]]
-name = "ups"
-dicomweb = "http://127.0.0.1:{port}/v1/dicomweb"
-timeout-seconds = 10
-[[rules]]
-name = "mesh"
-worklist = "ups"
-procedures = ["MESH^99HOSP"]
-images = "main"
-parameters = {{ iso = 500 }}
-send = [ {{ pacs = "main" }}, {{ pacs = "main", format = "sr" }} ]
-"""
-WORKITEMS = "/v1/dicomweb/workitems"
+PATH = "/v1/dicomweb"
+WORKITEMS = PATH + "/workitems"
 
 
 def workitem(series, patient="PAT-4711"):
@@ -89,7 +77,7 @@ class OwnWorklist(Loop):
         series = self.series()
         listing = self.daemon(rules="[worklist]")
         uid = self.scheduled(listing, series)
-        performer = self.daemon(rules=RULE.format(port=listing.port))
+        performer = self.daemon(rules=RULE.format(port=listing.port, path=PATH))
         self.reaches(listing, uid, "COMPLETED")
         self.assert_performed(listing, performer, uid, series)
         self.assertEqual(self.ask(listing, "GET", "?ProcedureStepState=SCHEDULED")[0], 204)
@@ -106,7 +94,7 @@ class OwnWorklist(Loop):
         way = peers.Proxy(0)
         self.addCleanup(way.close)
         series = [self.series() for _ in range(3)]
-        daemon = self.daemon(rules=RULE.format(port=way.port) + "[worklist]")
+        daemon = self.daemon(rules=RULE.format(port=way.port, path=PATH) + "[worklist]")
         way.target = daemon.port
         uids = [self.scheduled(daemon, each) for each in series]
         for _ in range(4):
@@ -124,7 +112,7 @@ class OwnWorklist(Loop):
         self.addCleanup(way.close)
         held = self.series()
         self.proxy.fault = lambda _, path, __: (503, {}, b"") if held.uid in path else None
-        daemon = self.daemon(rules=RULE.format(port=way.port) + "[worklist]")
+        daemon = self.daemon(rules=RULE.format(port=way.port, path=PATH) + "[worklist]")
         way.target = daemon.port
         uid = self.scheduled(daemon, held)
         self.reaches(daemon, uid, "IN PROGRESS")
@@ -149,7 +137,7 @@ class OwnWorklist(Loop):
         held = self.series()
         uid = self.scheduled(listing, held)
         self.proxy.fault = lambda _, path, __: (503, {}, b"") if held.uid in path else None
-        performer = self.daemon(rules=RULE.format(port=listing.port))
+        performer = self.daemon(rules=RULE.format(port=listing.port, path=PATH))
         self.reaches(listing, empty, "CANCELED")
         self.reaches(listing, uid, "IN PROGRESS")
         status, warning, _ = self.ask(listing, "POST", f"/{uid}/cancelrequest")

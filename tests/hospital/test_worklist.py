@@ -6,20 +6,6 @@ import peers
 import worklist
 from fixture import Loop
 
-RULE = """
-[[pacs]]
-name = "ups"
-dicomweb = "http://127.0.0.1:{port}"
-timeout-seconds = 10
-[[rules]]
-name = "mesh"
-worklist = "ups"
-procedures = ["MESH^99HOSP"]
-images = "main"
-parameters = {{ iso = 500 }}
-send = [ {{ pacs = "main" }}, {{ pacs = "main", format = "sr" }} ]
-"""
-
 
 class Workitems(Loop):
     def setUp(self):
@@ -31,7 +17,7 @@ class Workitems(Loop):
         self.list.close()
 
     def performer(self):
-        return self.daemon(rules=RULE.format(port=self.list.port))
+        return self.daemon(rules=worklist.RULE.format(port=self.list.port, path=""))
 
     def scheduled(self, series, **more):
         uid = self.uid()

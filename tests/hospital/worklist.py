@@ -7,6 +7,21 @@ INPUT, PROCEDURE, OUTPUTS = "00404021", "00404018", "00404033"
 TRANSACTION, STATE, PROGRESS, PERFORMED = "00081195", "00741000", "00741002", "00741216"
 NEXT = {"SCHEDULED": ("IN PROGRESS",), "IN PROGRESS": ("COMPLETED", "CANCELED")}
 
+# The rule of a daemon that performs workitems.
+RULE = """
+[[pacs]]
+name = "ups"
+dicomweb = "http://127.0.0.1:{port}{path}"
+timeout-seconds = 10
+[[rules]]
+name = "mesh"
+worklist = "ups"
+procedures = ["MESH^99HOSP"]
+images = "main"
+parameters = {{ iso = 500 }}
+send = [ {{ pacs = "main" }}, {{ pacs = "main", format = "sr" }} ]
+"""
+
 
 def value(item, tag):
     return item.get(tag, {}).get("Value", [None])[0]

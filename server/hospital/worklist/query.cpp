@@ -70,7 +70,7 @@ std::string tag_of(const std::string& parameter, std::string_view part) {
     throw invalid_parameter(parameter,
                             "is no known keyword of an attribute; give its tag, as in 00741000");
   }
-  // Whoever could search for it could guess it digit by digit.
+  // Searches could guess it digit by digit.
   if (tag == kTransactionTag) throw invalid_parameter(parameter, "cannot be searched for");
   return tag;
 }
