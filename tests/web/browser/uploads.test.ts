@@ -78,8 +78,11 @@ describe('an upload', () => {
   });
 
   it('ends where a proxy answers with its login page', async ({ page, daemon }) => {
+    await page.route('**/v1/volumes?*', (route) => {
+      if (route.request().method() !== 'POST') return route.continue(); // the list of volumes has the same address
+      return route.fulfill({ status: 200, contentType: 'text/html', body: '<html>Log in</html>' });
+    });
     await page.goto(daemon.url);
-    await page.route('**/v1/volumes?*', (route) => route.fulfill({ status: 200, contentType: 'text/html', body: '<html>Log in</html>' }));
     await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(16, 5, 31) }]);
     await expect.poll(() => page.locator('.refusal').innerText()).toContain('not one of isomeshd');
     await page.getByRole('button', { name: 'Try again' }).waitFor();
