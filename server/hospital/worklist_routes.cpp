@@ -59,7 +59,7 @@ void check_reader(const OwnWorklist& list, const Request& request) {
 }
 
 void warn(Response& response, const std::string& warning) {
-  if (!warning.empty()) response.set_header("Warning", "299 isomesh \"" + warning + '"');
+  if (!warning.empty()) response.add_header("Warning", "299 isomesh \"" + warning + '"');
 }
 
 // Runs a rule. The header of a refusal has the sentence of the standard.
@@ -82,8 +82,15 @@ std::string uid_in_query(const Request& request) {
   throw invalid_parameter(name, "is unknown: the query may have one UID only, as in ?1.2.3");
 }
 
-std::string workitem_body(App& app, const Request& request) {
-  return json_body(app, request, kDicomJson, worklist::kMostBodyBytes);
+worklist::DataSet data_set_of(App& app, const Request& request) {
+  if (request.header("Content-Type").empty()) {
+    throw Error(ErrorCode::kUnsupportedMedia,
+                std::string("the body needs the Content-Type ") + kDicomJson);
+  }
+  worklist::DataSet data =
+      worklist::parse_data_set(json_body(app, request, kDicomJson, worklist::kMostBodyBytes));
+  worklist::check_types(data);
+  return data;
 }
 
 Error unknown_workitem() {
@@ -100,8 +107,7 @@ void create(App& app, const OwnWorklist* worklist, const Request& request, Respo
   const OwnWorklist& list = configured(worklist);
   check_requester(list, request);
   const std::string uid = uid_in_query(request);
-  const WorkitemRecord record = worklist::new_workitem(
-      uid, worklist::parse_data_set(workitem_body(app, request)), time_now());
+  const WorkitemRecord record = worklist::new_workitem(uid, data_set_of(app, request), time_now());
   if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
   switch (
       list.workitems.add(record, {.most = list.settings.most, .most_bytes = kMostStoredBytes})) {
@@ -161,6 +167,10 @@ void search(const OwnWorklist* worklist, const Request& request, Response& respo
     ++count;
     return true;
   });
+  if (query.wants_fuzzy) {
+    warn(response,
+         "The fuzzymatching parameter is not supported. Only literal matching has been performed.");
+  }
   if (has_more) warn(response, "There are additional results that can be requested");
   if (count > 0) return answer_dicom_json(response, '[' + found + ']');
   response.status = 204;
@@ -189,7 +199,7 @@ void update(App& app, const OwnWorklist* worklist, const Request& request, Respo
   const OwnWorklist& list = configured(worklist);
   check_reader(list, request);  // a login without rights learns nothing
   const std::string transaction = uid_in_query(request);
-  const worklist::DataSet changes = worklist::parse_data_set(workitem_body(app, request));
+  const worklist::DataSet changes = data_set_of(app, request);
   change(list, request, response, 200, [&](WorkitemRecord& record) {
     record.state == store::WorkitemState::kScheduled ? check_requester(list, request)
                                                      : check_performer(list, request);
@@ -203,7 +213,7 @@ void change_state(App& app, const OwnWorklist* worklist, const Request& request,
   check_known(request, {});
   const OwnWorklist& list = configured(worklist);
   check_performer(list, request);
-  const worklist::DataSet wanted = worklist::parse_data_set(workitem_body(app, request));
+  const worklist::DataSet wanted = data_set_of(app, request);
   change(list, request, response, 200, [&](WorkitemRecord& record) {
     return worklist::change_state(record, wanted, time_now());
   });
@@ -214,8 +224,8 @@ void request_cancellation(App& app, const OwnWorklist* worklist, const Request& 
   check_known(request, {});
   const OwnWorklist& list = configured(worklist);
   check_requester(list, request);
-  const std::string body = request.content_length == 0 ? "" : workitem_body(app, request);
-  const worklist::DataSet reason = worklist::parse_data_set(body.empty() ? "{}" : body);
+  const worklist::DataSet reason =
+      request.content_length == 0 ? worklist::DataSet::object() : data_set_of(app, request);
   const auto known = list.workitems.find(request.path_parameter("uid"));
   if (known && known->state == store::WorkitemState::kInProgress &&
       list.cancel_performing(known->transaction)) {

@@ -33,7 +33,7 @@ def workitem(series, patient="PAT-4711"):
 class OwnWorklist(Loop):
     def ask(self, daemon, method, path, body=None, token=None, kind="application/dicom+json"):
         """Returns status, the text of the header Warning, and the data sets."""
-        headers = {"Content-Type": kind} if body is not None else {}
+        headers = {"Content-Type": kind} if body is not None and kind else {}
         if token:
             headers["Authorization"] = "Bearer " + token
         text = None if body is None else json.dumps(body)
@@ -157,8 +157,10 @@ class OwnWorklist(Loop):
         unready = {**workitem(series), STATE: {"vr": "CS", "Value": ["IN PROGRESS"]}}
         self.assertEqual(self.ask(daemon, "POST", "?" + self.uid(), unready)[0], 400)
         self.assertEqual(self.ask(daemon, "POST", "", workitem(series))[0], 400)
-        self.assertEqual(self.ask(daemon, "POST", "?" + uid, [], kind="application/dicom+xml")[0],
-                         415)
+        for kind in ("application/dicom+xml", None):
+            self.assertEqual(self.ask(daemon, "POST", "?" + self.uid(), workitem(series), kind=kind)[0], 415)
+        numbered = {**workitem(series), "00741204": {"vr": "LO", "Value": [7]}}
+        self.assertEqual(self.ask(daemon, "POST", "?" + self.uid(), numbered)[0], 400)
         own = {**workitem(series), "00080018": {"vr": "UI", "Value": [self.uid()]}}
         self.assertEqual(self.ask(daemon, "POST", "", [own])[0], 201)
         self.assertEqual(self.ask(daemon, "POST", "?" + self.uid(), workitem(series))[0], 503)
@@ -167,6 +169,9 @@ class OwnWorklist(Loop):
         self.assertEqual(warning, "There are additional results that can be requested")
         self.assertEqual(len(self.ask(daemon, "GET", "?limit=1&offset=1")[2]), 1)
         self.assertEqual(self.ask(daemon, "GET", "?offset=2")[0], 204)
+        status, warning, found = self.ask(daemon, "GET", "?limit=5&fuzzymatching=TRUE")
+        self.assertEqual((status, len(found), warning),
+                         (200, 2, "The fuzzymatching parameter is not supported. Only literal matching has been performed."))
         self.assertEqual(self.ask(daemon, "GET", "?TransactionUID=1.99")[0], 400)
         self.assertEqual(self.ask(daemon, "GET", "/1.2.3")[0], 404)
         self.assertEqual(self.ask(daemon, "PUT", "/1.2.3/state", self.claim("1.99"))[0], 404)

@@ -20,6 +20,16 @@ constexpr std::array<std::string_view, 34> kRepresentations = {
     "OB", "OD", "OF", "OL", "OV", "OW", "PN", "SH", "SL", "SQ", "SS", "ST",
     "SV", "TM", "UC", "UI", "UL", "UN", "UR", "US", "UT", "UV"};
 
+// The kinds of JSON that values have (PS3.18, table F.2.3-1). Where precision matters, numbers may
+// be texts.
+constexpr std::array<std::string_view, 6> kNumbers = {"FD", "FL", "SL", "SS", "UL", "US"};
+constexpr std::array<std::string_view, 4> kNumbersOrTexts = {"DS", "IS", "SV", "UV"};
+constexpr std::array<std::string_view, 7> kBinary = {"OB", "OD", "OF", "OL", "OV", "OW", "UN"};
+
+bool is_in(const auto& list, const std::string& vr) {
+  return std::ranges::find(list, vr) != list.end();
+}
+
 [[noreturn]] void reject(const std::string& tag, const std::string& message) {
   throw invalid_parameter(tag, message);
 }
@@ -78,7 +88,7 @@ json checked_value(const std::string& tag, const std::string& vr, const json& va
 json checked_attribute(const std::string& tag, const json& element) {
   const auto vr = element.is_object() ? element.find("vr") : element.end();
   if (!element.is_object() || vr == element.end() || !vr->is_string() ||
-      std::ranges::find(kRepresentations, vr->get<std::string>()) == kRepresentations.end()) {
+      !is_in(kRepresentations, vr->get<std::string>())) {
     reject(tag, "must have a vr, as in {\"vr\": \"CS\", \"Value\": [\"READY\"]}");
   }
   json result = {{"vr", *vr}};
@@ -104,7 +114,27 @@ DataSet checked(const json& object) {
   return data;
 }
 
+void check_type(const std::string& tag, const std::string& vr, const json& value) {
+  if (!value.is_string() && !value.is_number()) return;  // data sets, names and nothing
+  if (is_in(kBinary, vr)) reject(tag, "must have no Value, because its vr is " + vr);
+  if (is_in(kNumbersOrTexts, vr)) return;
+  const bool wants_number = is_in(kNumbers, vr);
+  if (value.is_number() == wants_number) return;
+  reject(tag, std::string("must have ") + (wants_number ? "numbers" : "texts") +
+                  " as values, because its vr is " + vr);
+}
+
 }  // namespace
+
+void check_types(const DataSet& data) {
+  for (const auto& [tag, element] : data.items()) {
+    for (const json& value : values_of(data, tag)) {
+      const auto vr = element.at("vr").get<std::string>();
+      check_type(tag, vr, value);
+      if (vr == "SQ" && value.is_object()) check_types(value);
+    }
+  }
+}
 
 DataSet parse_data_set(std::string_view text) {
   json body = bounded_json(text);

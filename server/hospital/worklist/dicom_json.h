@@ -16,6 +16,10 @@ using DataSet = nlohmann::json;
 // what is no data set, has bulk data, or is nested too deeply.
 DataSet parse_data_set(std::string_view text);
 
+// Throws Error kInvalidParameter that names the attribute whose values are of another kind than its
+// vr wants, such as a number for a CS. For requests: older records may have such values.
+void check_types(const DataSet& data);
+
 // The values of an attribute; empty without the attribute or values.
 const std::vector<nlohmann::json>& values_of(const DataSet& data, std::string_view tag);
 

@@ -213,7 +213,10 @@ Query parse_query(const std::vector<std::pair<std::string, std::string>>& parame
     } else if (name == "includefield") {
       continue;  // results have all attributes
     } else if (name == "fuzzymatching") {
-      if (value == "true") throw invalid_parameter(name, "is not supported");
+      query.wants_fuzzy = lower(value) == "true";
+      if (!query.wants_fuzzy && lower(value) != "false") {
+        throw invalid_parameter(name, "must be true or false");
+      }
     } else {
       std::vector<std::string> path;
       for (const std::string_view part : split(name, '.')) path.push_back(tag_of(name, part));

@@ -17,6 +17,7 @@ struct Query {
   std::vector<std::pair<std::vector<std::string>, std::string>> keys;
   std::size_t limit = 100;
   std::size_t offset = 0;
+  bool wants_fuzzy = false;  // which is not supported
 
   // The state that the query wants, if it wants a single one.
   std::optional<store::WorkitemState> state() const;

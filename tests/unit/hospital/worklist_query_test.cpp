@@ -73,7 +73,7 @@ TEST(WorklistQuery, KnowsWhatItDoesNotSearchFor) {
            std::pair<std::string, std::string>{"PatientsName", "x"},
            {"0010001", "x"},
            {"ScheduledWorkitemCodeSequence.", "x"},
-           {"fuzzymatching", "true"},
+           {"fuzzymatching", "yes"},
            {"limit", "-1"},
            {"offset", "x"},
            {"TransactionUID", "1.99"},
@@ -99,6 +99,10 @@ TEST(WorklistQuery, HasItsPlaceInTheList) {
   EXPECT_EQ(query.limit, kMostResults);
   EXPECT_EQ(query.offset, 7U);
   EXPECT_EQ(query.state(), store::WorkitemState::kInProgress);
+  EXPECT_FALSE(query.wants_fuzzy);
+  for (const char* yes : {"true", "TRUE"}) {
+    EXPECT_TRUE(parse_query({{"fuzzymatching", yes}}).wants_fuzzy) << yes;
+  }
   EXPECT_EQ(parse_query({{"ProcedureStepState", "*"}}).state(), std::nullopt);
 }
 

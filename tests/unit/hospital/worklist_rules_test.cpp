@@ -230,5 +230,32 @@ TEST(WorklistRules, WhatIsNoDataSetIsNamed) {
             R"({"0074100E":{"vr":"SQ"}})");
 }
 
+TEST(WorklistRules, ValuesOfAnotherKindAreNamed) {
+  const auto data = [](const std::string& vr, const std::string& value) {
+    return parse_data_set(R"({"00404021":{"vr":"SQ","Value":[{"00741000":{"vr":")" + vr +
+                          R"(","Value":[)" + value + "]}}]}}");
+  };
+  for (const auto& [vr, value] : {std::pair<std::string, std::string>{"CS", "7"},
+                                  {"DT", "20260102"},
+                                  {"US", R"("7")"},
+                                  {"FD", R"("0.5")"},
+                                  {"OB", R"("AAAA")"},
+                                  {"UN", "7"}}) {
+    const Error error =
+        test::error_of([&, &kind = vr, &what = value] { check_types(data(kind, what)); }, vr);
+    ASSERT_EQ(error.code(), ErrorCode::kInvalidParameter) << vr;
+    EXPECT_EQ(error.fields().front().field, "00741000") << vr;
+  }
+  for (const auto& [vr, value] : {std::pair<std::string, std::string>{"CS", R"("READY",null)"},
+                                  {"US", "7"},
+                                  {"FD", "0.5,1"},
+                                  {"DS", R"("0.5",0.5)"},
+                                  {"IS", R"(7,"7")"},
+                                  {"UV", R"("18446744073709551615")"},
+                                  {"PN", R"({"Alphabetic":"Doe^Jane"})"}}) {
+    EXPECT_NO_THROW(check_types(data(vr, value))) << vr;
+  }
+}
+
 }  // namespace
 }  // namespace isomesh::worklist
