@@ -67,7 +67,6 @@ struct SeriesFacts {
   std::string study_uid = {};
   std::string study_description = {};
   std::string study_date = {};
-  std::optional<ChoicePicture> picture = {};
 
   bool operator==(const SeriesFacts&) const = default;
 };
@@ -76,8 +75,9 @@ struct SeriesFacts {
 struct Choice {
   std::string parameter;
   std::string value;
-  std::string title;                       // of this choice, for a person
-  std::optional<SeriesFacts> series = {};  // of DICOM images
+  std::string title;                          // of this choice, for a person
+  std::optional<SeriesFacts> series = {};     // of DICOM images
+  std::optional<ChoicePicture> picture = {};  // of a slice in the middle
 
   bool operator==(const Choice&) const = default;
 };

@@ -330,9 +330,6 @@ void visit(Is<SeriesFacts> auto& self, auto&& field) {
   field("study_uid", self.study_uid);
   field("study_description", self.study_description);
   field("study_date", self.study_date);
-  if (is_told(self, self.picture.has_value())) {
-    field("picture", self.picture);
-  }
 }
 
 void visit(Is<Choice> auto& self, auto&& field) {
@@ -341,6 +338,9 @@ void visit(Is<Choice> auto& self, auto&& field) {
   field("title", self.title);
   if (is_told(self, self.series.has_value())) {
     field("series", self.series);
+  }
+  if (is_told(self, self.picture.has_value())) {
+    field("picture", self.picture);
   }
 }
 

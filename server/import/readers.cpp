@@ -10,6 +10,7 @@
 #include "server/import/images/tiff.h"
 #include "server/import/labels_beside.h"
 #include "server/import/members.h"
+#include "server/import/samples/choice_pictures.h"
 #include "server/import/samples/transfer.h"
 #include "server/import/source/gzip.h"
 
@@ -62,11 +63,32 @@ void gunzip(const InputFile& file, std::uint64_t limit, ScratchFile& target) {
   }
 }
 
+bool asks_for_volume(const Error& error) {
+  const std::vector<Choice>& choices = error.remedy().choices;
+  return !choices.empty() && choices.front().parameter == "volume";
+}
+
+ImportOptions with_first_volume(ImportOptions options) {
+  options.volume = 0;
+  return options;
+}
+
+SourceVolume described(const Reader& reader, const InputFile& file, const Input& input) {
+  const ImportOptions& options = input.task.options;
+  try {
+    return reader.describe(file, input.companions, options);
+  } catch (const Error& error) {
+    if (!asks_for_volume(error)) throw;
+    const SourceVolume first = reader.describe(file, input.companions, with_first_volume(options));
+    throw with_pictures(error, file, first, input.task.scratch);
+  }
+}
+
 Volume parse(const Reader& reader, const Input& input) {
   Volume volume;
   if (reader.describe != nullptr) {
     const InputFile file(input.path);
-    const SourceVolume source = reader.describe(file, input.companions, input.task.options);
+    const SourceVolume source = described(reader, file, input);
     volume = write_canonical(file, source, input.task);
   } else {
     volume = reader.parse(input);
@@ -108,12 +130,24 @@ MostBytes most_plain_bytes(const Reader& reader, const InputFile& beginning,
                   (volume.has_footer ? kFooterBytes : 0)};
 }
 
+// The size is the same whichever volume of several is chosen. The question which one comes with
+// pictures of all, for which the whole file is needed.
+MostBytes most_of_any_volume(const Reader& reader, const InputFile& beginning, ImportTask task) {
+  try {
+    return most_plain_bytes(reader, beginning, task);
+  } catch (const Error& error) {
+    if (!asks_for_volume(error)) throw;
+    task.options = with_first_volume(task.options);
+    return most_plain_bytes(reader, beginning, task);
+  }
+}
+
 // The largest inflated size of a compressed file; larger ones are rejected as bombs.
 std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
                                   const ImportTask& task) {
   if (reader.content == Content::kFiles) return most_archive_bytes(file.size(), task.limits);
   const InflatedBeginning beginning(file, task.scratch);
-  return most_plain_bytes(reader, beginning.file(), task).file;
+  return most_of_any_volume(reader, beginning.file(), task).file;
 }
 
 void check_options(const Reader& reader, const ImportOptions& options) {
@@ -138,9 +172,9 @@ const Reader* sniff(std::string_view head) {
 const Reader* sniff(const InputFile& file) { return sniff(file.text(0, kSniffBytes)); }
 
 MostBytes most_bytes_of(const Reader& reader, const InputFile& beginning, const ImportTask& task) {
-  if (!is_compressed(beginning)) return most_plain_bytes(reader, beginning, task);
+  if (!is_compressed(beginning)) return most_of_any_volume(reader, beginning, task);
   const InflatedBeginning plain(beginning, task.scratch);
-  MostBytes most = most_plain_bytes(reader, plain.file(), task);
+  MostBytes most = most_of_any_volume(reader, plain.file(), task);
   // Deflate stores incompressible data with a few extra bytes per block.
   constexpr std::uint64_t kStoredShare = 100;
   most.file += most.file / kStoredShare;

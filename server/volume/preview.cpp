@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -13,21 +14,31 @@
 namespace isomesh::volume {
 namespace {
 
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
 std::string vector_text(const std::array<double, 3>& vector) {
   return '(' + to_text(vector[0]) + ',' + to_text(vector[1]) + ',' + to_text(vector[2]) + ')';
+}
+
+using Dims = std::array<std::uint32_t, 3>;
+
+Dims block_of(const Dims& dims, std::uint32_t most) {
+  return {(dims[0] - 1) / most + 1, (dims[1] - 1) / most + 1, (dims[2] - 1) / most + 1};
+}
+
+Dims reduced(const Dims& dims, const Dims& block) {
+  return {(dims[0] - 1) / block[0] + 1, (dims[1] - 1) / block[1] + 1, (dims[2] - 1) / block[2] + 1};
 }
 
 }  // namespace
 
 PreviewNrrd::PreviewNrrd(std::shared_ptr<const CanonicalFile> volume, const PreviewChoice& choice)
-    : volume_(std::move(volume)), choice_(choice) {
-  const auto& dims = volume_->header().dims;
-  for (std::size_t axis = 0; axis < dims.size(); ++axis) {
-    block_[axis] = (dims[axis] - 1) / choice_.most + 1;
-    dims_[axis] = (dims[axis] - 1) / block_[axis] + 1;
-  }
-  sums_.resize(std::size_t{dims_[0]} * dims_[1]);
-  counts_.resize(sums_.size());
+    : volume_(std::move(volume)),
+      choice_(choice),
+      block_(block_of(volume_->header().dims, choice.most)),
+      dims_(reduced(volume_->header().dims, block_)),
+      thin_(dims_[0], dims_[1]) {
+  begin_layer();
 }
 
 std::string PreviewNrrd::header() const {
@@ -95,6 +106,8 @@ void PreviewNrrd::add_row(const std::byte* samples, std::size_t row) {
   for (std::uint32_t cell = 0, begin = 0; cell < dims_[0]; ++cell, begin += block_[0]) {
     const std::uint32_t end = std::min(width, begin + block_[0]);
     double sum = 0;
+    Sample least = std::numeric_limits<Sample>::max();
+    Sample greatest = std::numeric_limits<Sample>::lowest();
     std::uint32_t count = end - begin;
     for (std::uint32_t at = begin; at < end; ++at) {
       Sample sample;
@@ -106,19 +119,62 @@ void PreviewNrrd::add_row(const std::byte* samples, std::size_t row) {
         }
       }
       sum += static_cast<double>(sample);
+      least = std::min(least, sample);
+      greatest = std::max(greatest, sample);
     }
     sums_[line + cell] += sum;
     counts_[line + cell] += count;
+    if (count == 0) continue;
+    least_[line + cell] = std::min(least_[line + cell], static_cast<double>(least));
+    greatest_[line + cell] = std::max(greatest_[line + cell], static_cast<double>(greatest));
   }
 }
 
+void PreviewNrrd::begin_layer() {
+  const std::size_t count = std::size_t{dims_[0]} * dims_[1];
+  sums_.assign(count, 0);
+  counts_.assign(count, 0);
+  least_.assign(count, kNone);
+  greatest_.assign(count, -kNone);
+}
+
 void PreviewNrrd::end_layer() {
+  ThinParts::Layer layer;
   for (std::size_t at = 0; at < sums_.size(); ++at) {
     // Without any number the mean is NaN, which is black.
-    bytes_ += static_cast<char>(grey(sums_[at] / counts_[at], choice_.window));
+    const bool has_any = counts_[at] > 0;
+    layer.mean.push_back(grey(sums_[at] / counts_[at], choice_.window));
+    layer.least.push_back(has_any ? grey(least_[at], choice_.window) : 0);
+    layer.greatest.push_back(has_any ? grey(greatest_[at], choice_.window) : 0);
   }
-  std::ranges::fill(sums_, 0);
-  std::ranges::fill(counts_, 0);
+  begin_layer();
+  ++read_;
+  if (!is_reduced()) {
+    bytes_.append(layer.mean.begin(), layer.mean.end());
+    return;
+  }
+  layers_.push_back(thin_.known(std::move(layer)));
+  while (written_ < read_ && (read_ == dims_[2] || written_ + ThinParts::kReach < read_)) {
+    write_layer();
+  }
+}
+
+bool PreviewNrrd::is_reduced() const {
+  return std::ranges::any_of(block_, [](std::uint32_t count) { return count > 1; });
+}
+
+void PreviewNrrd::write_layer() {
+  constexpr std::uint32_t kReach = ThinParts::kReach;
+  const std::size_t first = read_ - layers_.size();
+  std::array<const ThinParts::KnownLayer*, 2 * kReach + 1> around = {};
+  for (std::uint32_t at = 0; at < around.size(); ++at) {
+    const std::uint32_t layer = std::max(written_ + at, kReach) - kReach;
+    around[at] = &layers_[std::min(layer, read_ - 1) - first];
+  }
+  const ThinParts::Greys kept = thin_.kept(around);
+  bytes_.append(kept.begin(), kept.end());
+  ++written_;
+  if (written_ > kReach + first) layers_.pop_front();
 }
 
 }  // namespace isomesh::volume

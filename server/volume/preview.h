@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "server/volume/canonical.h"
+#include "server/volume/thin_parts.h"
 
 namespace isomesh::volume {
 
@@ -21,8 +23,8 @@ struct PreviewChoice {
 
 // An NRRD file (uint8, raw, space left-posterior-superior), generated in pieces while it is sent.
 // Along each axis the same number of samples, the smallest that leaves at most `most`, is averaged,
-// ignoring NaN, and mapped to eight bits by the window. The last block of an axis may be smaller. A
-// sample's position is the centre of a full block.
+// ignoring NaN, and mapped to eight bits by the window; what is thin stays (thin_parts.h). The last
+// block of an axis may be smaller. A sample's position is the centre of a full block.
 //
 // The bytes depend only on the volume and the choice. Not thread safe.
 class PreviewNrrd {
@@ -43,17 +45,28 @@ class PreviewNrrd {
   std::uint64_t add_rows();
   template <class Sample>
   void add_row(const std::byte* samples, std::size_t row);
+  void begin_layer();
   void end_layer();
+  void write_layer();
+  bool is_reduced() const;
 
   std::shared_ptr<const CanonicalFile> volume_;
   PreviewChoice choice_;
-  std::array<std::uint32_t, 3> block_ = {};  // samples averaged along each axis
-  std::array<std::uint32_t, 3> dims_ = {};
+  std::array<std::uint32_t, 3> block_;  // samples averaged along each axis
+  std::array<std::uint32_t, 3> dims_;
   bool has_begun_ = false;
   std::uint32_t row_ = 0;
   std::uint32_t slice_ = 0;
+  // Of each block of the layer that is read.
   std::vector<double> sums_;
+  std::vector<double> least_;
+  std::vector<double> greatest_;
   std::vector<std::uint32_t> counts_;
+  ThinParts thin_;
+  // The last layers that were read, of which the next to write has the number `written_`.
+  std::deque<ThinParts::KnownLayer> layers_;
+  std::uint32_t read_ = 0;
+  std::uint32_t written_ = 0;
   std::vector<std::byte> rows_;
   std::string bytes_;
 };

@@ -175,9 +175,8 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   job.mesh->quality.self_intersections.emplace();
   job.parameters.callback = Callback{"https://receiver.example/"};
   job.error = to_problem(invalid_parameter("iso", "is wrong"), "/v1/jobs/x");
-  job.error->remedy = {
-      .overridable = "frame-of-reference",
-      .choices = {{"series", "1.2", "CT", SeriesFacts{.picture = {{1, 1, "AA=="}}}}}};
+  job.error->remedy = {.overridable = "frame-of-reference",
+                       .choices = {{"series", "1.2", "CT", SeriesFacts{}, {{1, 1, "AA=="}}}}};
   Estimate estimate;
   estimate.iso = 60;
   estimate.simplified_triangles = 7;

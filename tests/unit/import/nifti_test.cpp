@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/base64.h"
 #include "server/volume/geometry.h"
+#include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/writers.h"
 
@@ -216,8 +218,10 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
   for (const std::string& bytes : {file, gzip(file)}) {
     const Outcome open = import_bytes(bytes);
     EXPECT_THAT(open.error, HasSubstr("2 volumes that differ in time"));
-    EXPECT_THAT(open.remedy.choices,
-                testing::ElementsAre(Choice{"volume", "0", "0 s"}, Choice{"volume", "1", "2.5 s"}));
+    ASSERT_EQ(open.remedy.choices.size(), 2);
+    EXPECT_EQ(open.remedy.choices[0].title, "0 s");
+    EXPECT_EQ(open.remedy.choices[1].value, "1");
+    EXPECT_EQ(open.remedy.choices[1].title, "2.5 s");
     const Outcome second = import_bytes(bytes, {}, {.volume = 1});
     EXPECT_EQ(second.sample_bytes(), kSmallSamples.substr(12));
     EXPECT_EQ(codes_of(second), std::vector<std::string>{"volume-chosen"});
@@ -228,6 +232,64 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
               HasSubstr("3 volumes that differ in dimension 5 (value)"));
   EXPECT_THAT(import_bytes(nifti({}, kSmallSamples), {}, {.volume = 1}).error,
               HasSubstr("only volume 0"));
+}
+
+std::vector<ChoicePicture> pictures_of(const std::string& bytes) {
+  std::vector<ChoicePicture> pictures;
+  for (const Choice& choice : import_bytes(bytes).remedy.choices) {
+    if (choice.picture) pictures.push_back(*choice.picture);
+  }
+  return pictures;
+}
+
+std::vector<int> greys_of(const ChoicePicture& picture) {
+  const auto bytes = from_base64(picture.grey).value();
+  std::vector<int> greys;
+  for (const auto byte : bytes) greys.push_back(static_cast<unsigned char>(byte));
+  return greys;
+}
+
+// Two volumes of three slices, of which the middle ones have these samples.
+std::string two_volumes(const std::string& first, const std::string& second, double along = 1) {
+  const std::string empty(first.size(), '\0');
+  return nifti(
+      {.dim = {4, 3, 2, 3, 2, 1, 1, 1}, .srow = {along, 0, 0, 0, 0, along, 0, 0, 0, 0, 1, 0}},
+      empty + first + empty + empty + second + empty);
+}
+
+TEST(Nifti, ShowsTheMiddleSliceOfEachVolumeOfASeries) {
+  const std::string first({0, 0, 50, 100, 100, 100});
+  const std::string second({100, 25, 0, 100, 127, 0});
+  // The first axis leads to the right of the patient and the second to the front, as usual.
+  const std::string file = two_volumes(first, second);
+  for (const std::string& bytes : {file, gzip(file), zip({{"a.nii", file}})}) {
+    const std::vector<ChoicePicture> pictures = pictures_of(bytes);
+    ASSERT_EQ(pictures.size(), 2);
+    EXPECT_EQ(pictures[0].width, 3);
+    EXPECT_EQ(pictures[0].height, 2);
+    EXPECT_THAT(greys_of(pictures[0]), testing::ElementsAre(255, 255, 255, 128, 0, 0));
+    // By the window of the first.
+    EXPECT_THAT(greys_of(pictures[1]), testing::ElementsAre(0, 255, 255, 0, 64, 255));
+  }
+  const std::string turned = two_volumes(first, second, -1);
+  EXPECT_THAT(greys_of(pictures_of(turned).at(0)), testing::ElementsAre(0, 0, 128, 255, 255, 255));
+}
+
+TEST(Nifti, ShowsManyVolumesInSmallerPictures) {
+  constexpr int kMany = 300;
+  const NiftiFields fields = {.dim = {4, 100, 80, 2, kMany, 1, 1, 1}};
+  const std::vector<ChoicePicture> pictures =
+      pictures_of(nifti(fields, std::string(std::size_t{100} * 80 * 2 * kMany, 'x')));
+  ASSERT_EQ(pictures.size(), kMany);
+  EXPECT_EQ(pictures.back().width, 50);
+  EXPECT_EQ(pictures.back().height, 40);
+}
+
+TEST(Nifti, AsksWithoutPicturesWhereTheFileEndsEarly) {
+  const std::string file = two_volumes("abcdef", "ghijkl");
+  const Outcome open = import_bytes(file.substr(0, file.size() - 1));
+  EXPECT_EQ(open.remedy.choices.size(), 2);
+  EXPECT_FALSE(open.remedy.choices.at(0).picture);
 }
 
 TEST(Nifti, OfFlatImagesInTimeIsNoVolume) {

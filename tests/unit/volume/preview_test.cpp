@@ -1,7 +1,10 @@
 #include "server/volume/preview.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -111,6 +114,65 @@ TEST_F(PreviewTest, ManySamplesComeInPieces) {
   EXPECT_GE(pieces, 4U);
   EXPECT_EQ(bytes.size(), preview.size());
   EXPECT_EQ(bytes.substr(bytes.find("\n\n") + 2), std::string(250 * 250 * 3, 7));
+}
+
+// A head holder is a sheet of about two samples. Means of its blocks cross the iso-value where it
+// lies within one block, and do not where two share it.
+std::vector<float> tilted_sheet(std::uint32_t size, float inside, float outside) {
+  std::vector<float> samples;
+  for (std::uint32_t z = 0; z < size; ++z) {
+    for (std::uint32_t y = 0; y < size; ++y) {
+      for (std::uint32_t x = 0; x < size; ++x) {
+        const double from = std::abs(y + 0.12 * x + 0.21 * z - 30);
+        const auto part = static_cast<float>(std::clamp(1.5 - from, 0.0, 1.0));
+        samples.push_back(outside + part * (inside - outside));
+      }
+    }
+  }
+  return samples;
+}
+
+TEST_F(PreviewTest, AThinSheetHasNoHoles) {
+  constexpr std::uint32_t kSize = 48;
+  for (const std::uint32_t block : {2U, 4U}) {
+    const std::uint32_t count = kSize / block;
+    for (const bool is_bright : {true, false}) {
+      const auto samples =
+          is_bright ? tilted_sheet(kSize, 100, -1000) : tilted_sheet(kSize, -1000, 100);
+      const File file =
+          file_of(volume_of(header_of({kSize, kSize, kSize}, SampleType::kFloat32), samples),
+                  {count, {-1000, 100}});
+      // Every line across it meets it.
+      for (std::uint32_t at = 0; at < count * count; ++at) {
+        int most = 0;
+        for (std::uint32_t y = 0; y < count; ++y) {
+          const int value = file.samples[(at / count * count + y) * count + at % count];
+          most = std::max(most, is_bright ? value : 255 - value);
+        }
+        ASSERT_GT(most, 180) << block << ' ' << is_bright << ' ' << at;
+      }
+    }
+  }
+}
+
+TEST_F(PreviewTest, WhatIsThickStaysAMean) {
+  constexpr std::uint32_t kSize = 48;
+  std::vector<float> samples;
+  double sum = 0;
+  for (std::uint32_t at = 0; at < kSize * kSize * kSize; ++at) {
+    const double x = at % kSize - 23.0;
+    const double y = at / kSize % kSize - 23.0;
+    const double z = at / kSize / kSize - 24.0;
+    samples.push_back(static_cast<float>(std::clamp(15.5 - std::hypot(x, y, z), 0.0, 1.0)));
+    sum += samples.back();
+  }
+  for (const std::uint32_t block : {2U, 3U}) {
+    const File file =
+        file_of(volume_of(header_of({kSize, kSize, kSize}, SampleType::kFloat32), samples),
+                {kSize / block, {0, 1}});
+    const double reduced = std::accumulate(file.samples.begin(), file.samples.end(), 0.0);
+    EXPECT_NEAR(reduced / 255 * std::pow(block, 3) / sum, 1, 0.002);
+  }
 }
 
 // A signal would end everybody else's requests too.

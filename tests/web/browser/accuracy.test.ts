@@ -105,10 +105,13 @@ describe('distances', () => {
     expect(['cut', 'rulers', 'cam'].map((name) => noted(page, name))).toEqual(before);
     expect(await page.locator('.ruler-labels span').innerText()).toBe(ruler);
     expect((await openedJob(at)).parameters.distances).not.toBe(true);
-    // As the address says.
+    // As the address says, of what was measured then.
+    const made = (): Promise<{ jobs: unknown[] }> => daemon.json(`/v1/jobs?volume=${ball}`);
+    const { length } = (await made()).jobs;
     await page.reload();
     await surfaceLoaded(page);
     await page.locator('.legend').waitFor();
+    expect((await made()).jobs).toHaveLength(length);
   });
 });
 

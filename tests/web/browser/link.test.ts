@@ -163,6 +163,7 @@ describe('the list of volumes', () => {
     await page.getByRole('button', { name: 'try a sample' }).click();
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
     await expect.poll(() => page.locator('h1').first().innerText()).toContain('Sample head');
+    await expect.poll(() => page.getByRole('group', { name: 'Presets' }).innerText()).toMatch(/skin[^]*bone/);
     await expect.poll(() => page.locator('.live[data-size] .live-picture[data-still]').count()).toBe(1);
     expect((await silhouette(page, page.locator('.live-picture'))).part).toBeGreaterThan(0.1);
     // With a volume the page needs no introduction.

@@ -153,7 +153,8 @@ describe('an upload of several volumes', () => {
   it('shows its time points on a slider before one is chosen', async ({ page, daemon }) => {
     await page.goto(daemon.url);
     const frames = Buffer.concat([1, 2, 3, 4, 5].map((bright) => Buffer.from(Array.from({ length: 12 }, (_, n) => bright * (n + 3)))));
-    await drop(page, [{ name: 'five.nii', bytes: seriesNifti(frames) }]);
+    // In an archive, of which the page reads nothing.
+    await drop(page, [{ name: 'study.tar', bytes: tarOf([{ name: 'five.nii', bytes: seriesNifti(frames) }]) }]);
     const choice = page.locator('.time-choice');
     const slider = page.getByRole('slider', { name: 'Volume of the file' });
     const brightness = (): Promise<number> =>
@@ -161,12 +162,11 @@ describe('an upload of several volumes', () => {
         const { data = [] } = canvas.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height) ?? {};
         return [...data].reduce((sum, value) => sum + value, 0);
       });
-    await expect.poll(() => choice.locator('canvas').getAttribute('data-shown')).toBe('0');
     await expect.poll(() => choice.innerText()).toContain('1 of 5');
     const before = await brightness();
     await slider.focus();
     for (let step = 0; step < 3; step += 1) await page.keyboard.press('ArrowRight');
-    await expect.poll(() => choice.locator('canvas').getAttribute('data-shown')).toBe('3');
+    await expect.poll(() => choice.innerText()).toContain('4 of 5');
     expect(await brightness()).toBeGreaterThan(before);
     await page.getByRole('button', { name: 'Use this one' }).click();
     await page.waitForURL(volumePage);

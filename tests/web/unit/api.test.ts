@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { EventParser } from '@/api/events';
 import { merged } from '@/api/follow';
+import { EventData } from '@/api/job_events';
 import { adviceFor, ApiError, asApiError, choicesOf, errorOf } from '@/api/problem';
 import type { Job } from '@/api/types';
 import { dispositionOf, uploadedOf, uploadPath } from '@/api/upload';
@@ -46,18 +46,15 @@ describe('errorOf', () => {
   });
 });
 
-describe('EventParser', () => {
-  const stream = ': ping\n\nevent: stage\ndata: {"stage":"smooth"}\n\r\nevent: done\r\ndata: a\r\ndata: b\r\n\r\n';
+describe('EventData', () => {
+  const stream = ': ping\n\nevent: stage\ndata: {"stage":"smooth"}\n\n: ping\n\nevent: done\ndata: {}\n\n';
 
-  it('finds the events, however the text comes', () => {
+  it('finds what events say, however the text comes', () => {
     for (const size of [1, 2, 5, stream.length]) {
-      const parser = new EventParser();
-      const events = [];
-      for (let i = 0; i < stream.length; i += size) events.push(...parser.take(stream.slice(i, i + size)));
-      expect(events, `pieces of ${size}`).toEqual([
-        { name: 'stage', data: '{"stage":"smooth"}' },
-        { name: 'done', data: 'a\nb' },
-      ]);
+      const data = new EventData();
+      const found = [];
+      for (let i = 0; i < stream.length; i += size) found.push(...data.take(stream.slice(i, i + size)));
+      expect(found.map((text) => JSON.parse(text) as unknown), `pieces of ${size}`).toEqual([{ stage: 'smooth' }, {}]);
     }
   });
 });

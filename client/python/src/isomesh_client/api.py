@@ -894,15 +894,6 @@ class ProblemErrors(TypedDict):
     message: str
 
 
-class ProblemChoicesSeriesPicture(TypedDict):
-    """A slice of the series, of at most 96 x 96 pixels. Only the first 100 series have one."""
-
-    width: int
-    height: int
-    #: A byte for each pixel, row by row, in base64.
-    grey: str
-
-
 class ProblemChoicesSeries(TypedDict):
     """What tells DICOM series apart, in DICOM's forms. Empty where the files do not say."""
 
@@ -911,7 +902,18 @@ class ProblemChoicesSeries(TypedDict):
     study_uid: str
     study_description: str
     study_date: str
-    picture: NotRequired[ProblemChoicesSeriesPicture]
+
+
+class ProblemChoicesPicture(TypedDict):
+    """A slice in the middle, of at most 96 x 96 pixels. DICOM series have one, except those
+    after the first 100, and so have the volumes of a file, such as time points, whose samples
+    lie one after another without a compression of their own; all of these are drawn by the
+    window of the first, and smaller if there are many."""
+
+    width: int
+    height: int
+    #: A byte for each pixel, row by row, in base64.
+    grey: str
 
 
 class ProblemChoices(TypedDict):
@@ -921,6 +923,7 @@ class ProblemChoices(TypedDict):
     #: A description of the value, for people.
     title: str
     series: NotRequired[ProblemChoicesSeries]
+    picture: NotRequired[ProblemChoicesPicture]
 
 
 class Problem(TypedDict):

@@ -49,6 +49,17 @@ function queryOf(values: Readonly<Record<string, string | number | undefined>>):
   return given.length === 0 ? '' : `?${new URLSearchParams(given.map(([name, value]) => [name, String(value)])).toString()}`;
 }
 
+// What all pages of a list hold.
+async function allPages<Page extends { next: string | null }, T>(pageAt: (cursor: string) => Promise<Page>, held: (page: Page) => T[]): Promise<T[]> {
+  const all: T[] = [];
+  for (let cursor: string | null = ''; cursor !== null; ) {
+    const page: Page = await pageAt(cursor);
+    all.push(...held(page));
+    cursor = page.next;
+  }
+  return all;
+}
+
 function volumePath(id: string): string {
   return `/v1/volumes/${encodeURIComponent(id)}`;
 }
@@ -201,14 +212,8 @@ export class Client {
   }
 
   /** Lists the labels of a finished job in ascending order, also if the job itself has only `labels_count`. */
-  async labelsOfJob(id: string, signal?: GlobalAbortSignal): Promise<LabelSummary[]> {
-    const labels: LabelSummary[] = [];
-    for (let cursor: string | null = ''; cursor !== null; ) {
-      const page: LabelSummaryList = await this.connection.json(`${jobPath(id)}/labels${queryOf({ cursor })}`, { signal });
-      labels.push(...page.labels);
-      cursor = page.next;
-    }
-    return labels;
+  labelsOfJob(id: string, signal?: GlobalAbortSignal): Promise<LabelSummary[]> {
+    return allPages((cursor) => this.connection.json<LabelSummaryList>(`${jobPath(id)}/labels${queryOf({ cursor })}`, { signal }), ({ labels }) => labels);
   }
 
   /** The report of a finished job: parameters, measurements, files and how the bound was proven. */
@@ -217,14 +222,8 @@ export class Client {
   }
 
   /** Lists the areas where two labels of a finished job touch, or one is next to the background, whose `b` is null. */
-  async wallsOfJob(id: string, signal?: GlobalAbortSignal): Promise<WallSummary[]> {
-    const walls: WallSummary[] = [];
-    for (let cursor: string | null = ''; cursor !== null; ) {
-      const page: WallList = await this.connection.json(`${jobPath(id)}/walls${queryOf({ cursor })}`, { signal });
-      walls.push(...page.walls);
-      cursor = page.next;
-    }
-    return walls;
+  wallsOfJob(id: string, signal?: GlobalAbortSignal): Promise<WallSummary[]> {
+    return allPages((cursor) => this.connection.json<WallList>(`${jobPath(id)}/walls${queryOf({ cursor })}`, { signal }), ({ walls }) => walls);
   }
 
   /** Erases a job that has ended, and its files. */

@@ -2,10 +2,21 @@
 // HTTP/1.1, and each stream keeps one.
 import { delayAfter } from './busy';
 import type { Connection } from './connection';
-import { EventParser } from './events';
 import { asApiError } from './problem';
 import { sleep } from './sleep';
 import type { JobChange } from './types';
+
+// Server-sent events (WHATWG HTML, 9.2.6) without EventSource, which cannot carry a token. The data of each are one line.
+export class EventData {
+  private rest = '';
+
+  // Those that this piece of text completes.
+  take(text: string): string[] {
+    const lines = (this.rest + text).split('\n');
+    this.rest = lines.pop() ?? '';
+    return lines.flatMap((line) => (line.startsWith('data:') ? [line.slice('data:'.length)] : []));
+  }
+}
 
 export interface JobListener {
   onChange: (change: JobChange) => void;
@@ -89,14 +100,14 @@ export class JobEvents {
     if (!reader) return;
     this.isOpen = true;
     for (const listener of [...this.listeners]) listener.onBegin();
-    const parser = new EventParser();
+    const data = new EventData();
     const decoder = new TextDecoder();
     for (;;) {
       const silence = setTimeout(() => void reader.cancel(), longestSilence);
       const { done, value } = await reader.read().finally(() => clearTimeout(silence));
       if (done) return;
-      for (const event of parser.take(decoder.decode(value, { stream: true }))) {
-        const change = JSON.parse(event.data) as JobChange;
+      for (const text of data.take(decoder.decode(value, { stream: true }))) {
+        const change = JSON.parse(text) as JobChange;
         for (const listener of [...this.listeners]) listener.onChange(change);
       }
     }

@@ -1,19 +1,21 @@
 // Other jobs from one: the same surface with changes, where its parameters are chosen, what its files are called.
 import { client } from '../client';
 import { errorOfProblem } from '../api/problem';
-import type { Job, JobParameters, Label, MeshFormat, Volume } from '../api/types';
+import { isFinal, type Job, type JobParameters, type Label, type MeshFormat, type Volume } from '../api/types';
 import { meshFileSuffix, meshFormatTitle, shortId } from '../ui/format';
 import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import { saveFile } from '../ui/save';
 import { fileStem } from '../volume/names';
 import { labelsOfMesh } from './labels';
-import { defaultParameters, jobRequest, queryOfParameters, surfaceInNames, surfaceInWords, variantOf, withGlb } from './parameters';
+import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInNames, surfaceInWords, variantOf, withGlb } from './parameters';
 import { forPrinting } from './printing';
 
 // Makes the same surface with other parameters, or finds it made already.
 export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
-  return client.submitJob(jobRequest(variantOf(job.parameters, variant)));
+  const parameters = variantOf(job.parameters, variant);
+  const { jobs } = await client.listJobs('', { state: 'succeeded', volume: job.volume });
+  return jobs.find((made) => isSameJob(made.parameters, parameters)) ?? client.submitJob(jobRequest(parameters));
 }
 
 // The same surface, for a printer.
@@ -21,8 +23,8 @@ export function makePrintable({ parameters }: Job, spacing: readonly number[]): 
   client.submitJob(jobRequest(forPrinting(parameters, spacing))).then(started, tellError);
 }
 
-function started({ id }: Job): void {
-  tell('A new job was started.');
+function started({ id, state }: Job): void {
+  tell(isFinal(state) ? 'This surface was made before.' : 'A new job was started.');
   go(['jobs', id]);
 }
 

@@ -84,6 +84,11 @@ export function packedNormals(sums: Float32Array): Int16Array<ArrayBuffer> {
   return normals;
 }
 
+// All blocks of a surface share one grid, so that a vertex on a seam has the same bits in every block that names it.
+export function placeKey(positions: Float32Array, vertex: number): string {
+  return positions.subarray(3 * vertex, 3 * vertex + 3).join();
+}
+
 // The vertices of edges whose other direction no triangle has. At most 65 535 vertices.
 export function borderVertices(index: ArrayLike<number>, vertices: number): Uint16Array<ArrayBuffer> {
   let slots = 1024;

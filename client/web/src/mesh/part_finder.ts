@@ -1,6 +1,6 @@
 // The parts of a surface that do not touch each other, found in its blocks some at a time.
 import type { Vec3 } from '../api/types';
-import type { Block } from './blocks';
+import { placeKey, type Block } from './blocks';
 
 export interface PartSummary {
   number: number;
@@ -90,10 +90,9 @@ export class PartFinder {
     }
   }
 
-  // A vertex on a seam has the same bits in every block that names it.
   private joinBorder({ border, positions }: Drawn, first: number): void {
     for (const vertex of border) {
-      const key = positions.subarray(3 * vertex, 3 * vertex + 3).join();
+      const key = placeKey(positions, vertex);
       const known = this.places.get(key);
       if (known === undefined) this.places.set(key, first + vertex);
       else this.join(known, first + vertex);

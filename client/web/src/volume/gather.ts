@@ -39,6 +39,8 @@ export interface Gathered {
   count: number;
   files: readonly NamedFile[];
   body: Blob;
+  // With which it is sent at first.
+  choices?: Readonly<Record<string, string>>;
   // Under which the daemon keeps the body while something of it is to be chosen.
   kept?: string;
   // What was made of its series so far, by their UIDs.

@@ -1,36 +1,22 @@
 #include "server/import/dicom/choosing/series_facts.h"
 
 #include <algorithm>
-#include <cmath>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "base/base64.h"
 #include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/pixels/pixels.h"
 #include "server/import/dicom/pixels/values.h"
+#include "server/import/samples/choice_pictures.h"
 
 namespace isomesh::import::dicom {
 namespace {
 
 constexpr std::size_t kMostPictures = 100;
-constexpr std::uint32_t kMostSide = 96;                        // pixels
 constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 24;  // of an image to be reduced
-constexpr double kDarkest = 0.02;                              // shares of the pixels
-constexpr double kBrightest = 0.99;
-
-// The finite values in ascending order.
-std::vector<double> sorted(std::span<const double> values) {
-  std::vector<double> finite;
-  std::ranges::copy_if(values, std::back_inserter(finite),
-                       [](double value) { return std::isfinite(value); });
-  std::ranges::sort(finite);
-  return finite;
-}
 
 // Skips pixels instead of averaging them, which is enough for a picture of this size.
 std::vector<double> reduced(std::span<const double> values, const PixelLayout& layout,
@@ -42,22 +28,6 @@ std::vector<double> reduced(std::span<const double> values, const PixelLayout& l
     }
   }
   return some;
-}
-
-std::vector<std::uint8_t> grey_of(std::span<const double> values) {
-  const std::vector<double> order = sorted(values);
-  if (order.empty()) return std::vector<std::uint8_t>(values.size());
-  const auto at = [&](double share) {
-    return order[static_cast<std::size_t>(share * static_cast<double>(order.size() - 1))];
-  };
-  const double low = at(kDarkest);
-  const double width = std::max(at(kBrightest) - low, 1e-9);
-  std::vector<std::uint8_t> grey;
-  for (const double value : values) {
-    const double share = std::isfinite(value) ? std::clamp((value - low) / width, 0.0, 1.0) : 0.0;
-    grey.push_back(static_cast<std::uint8_t>(std::lround(255 * share)));
-  }
-  return grey;
 }
 
 // The middle frame of an object. Empty if it cannot be shown, which is no fault of the upload: a
@@ -75,10 +45,9 @@ std::optional<ChoicePicture> picture_of(const DicomFile& file, const Image& imag
     return std::nullopt;
   }
   const std::uint32_t longer = std::max(layout.columns, layout.rows);
-  const std::uint32_t step = (longer + kMostSide - 1) / kMostSide;
-  return ChoicePicture{.width = (layout.columns + step - 1) / step,
-                       .height = (layout.rows + step - 1) / step,
-                       .grey = to_base64(grey_of(reduced(values, layout, step)))};
+  const std::uint32_t step = (longer + kMostPictureSide - 1) / kMostPictureSide;
+  const std::vector<double> some = reduced(values, layout, step);
+  return import::picture_of(some, (layout.columns + step - 1) / step, window_of(some));
 }
 
 SeriesFacts facts_of(const DataSet& data) {
@@ -107,7 +76,7 @@ Error with_series_facts(const Error& error, std::span<const Source> sources,
     try {
       const DicomFile file(middle.file.path, scratch, most_sample_bytes);
       choice.series = facts_of(file.data());
-      if (pictures++ < kMostPictures) choice.series->picture = picture_of(file, middle.image);
+      if (pictures++ < kMostPictures) choice.picture = picture_of(file, middle.image);
     } catch (const Error& unreadable) {
       if (unreadable.code() != ErrorCode::kUnusableVolume) throw;
     }

@@ -285,9 +285,9 @@ TEST(DicomChoice, IsAskedForWhenThereAreSeveralSeries) {
   EXPECT_EQ(second.value, "1.2.3.9");
   EXPECT_EQ(second.title, "scout, CT, 4 slices");
   // They are shown to a person, who knows them by these.
-  ASSERT_TRUE(first.series && first.series->picture);
+  ASSERT_TRUE(first.series && first.picture);
   EXPECT_EQ(first.series->study_uid, "1.2.3");
-  const ChoicePicture& picture = *first.series->picture;
+  const ChoicePicture& picture = *first.picture;
   EXPECT_EQ(from_base64(picture.grey)->size(), std::size_t{picture.width} * picture.height);
 }
 

@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshSummary, Volume } from '../../api/types';
 import { changeOf, type Change } from '../../job/changes';
 import { labelTitle } from '../../job/labels';
-import { isSameJob, surfaceInWords, variantOf } from '../../job/parameters';
+import { surfaceInWords } from '../../job/parameters';
 import { commandSnippet, curlSnippet, javascriptSnippet, librarySnippet, pythonSnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, saveVariant, submitVariant } from '../../job/variants';
@@ -199,11 +199,7 @@ export function compareSection(job: Job): HTMLElement {
     });
   const start = async (variants: Partial<JobParameters>[]): Promise<void> => {
     try {
-      const jobs = await Promise.all(
-        variants.map((variant) =>
-          isSame(job, variant) ? Promise.resolve(job) : submitVariant(job, variant),
-        ),
-      );
+      const jobs = await Promise.all(variants.map((variant) => submitVariant(job, variant)));
       go(['compare'], new URLSearchParams({ jobs: jobs.map(({ id }) => id).join(',') }));
     } catch (error) {
       tellError(error);
@@ -219,10 +215,6 @@ export function compareSection(job: Job): HTMLElement {
     ]),
     h('p.hint', 'Starts the jobs that are missing. The list of jobs can compare any other jobs.'),
   );
-}
-
-function isSame(job: Job, variant: Partial<JobParameters>): boolean {
-  return job.mesh?.files.glb !== undefined && isSameJob(job.parameters, variantOf(job.parameters, variant));
 }
 
 function copyButton(text: () => string): HTMLButtonElement {

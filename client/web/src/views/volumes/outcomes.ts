@@ -4,8 +4,9 @@ import type { UploadedVolume, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
 import { formatDims } from '../../ui/format';
 import { hashOf } from '../../ui/route';
+import type { Gathered } from '../../volume/gather';
 import { skippedText, volumeName } from '../../volume/names';
-import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices, type Source } from './remedies';
+import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices } from './remedies';
 
 // Either a volume or an error.
 export interface Outcome {
@@ -55,21 +56,21 @@ function refusedRow(
   error: ApiError,
   name: string,
   { choices, asked }: Outcome,
-  source: Source,
+  stored: Gathered['stored'],
   onAgain: (...each: [Choices, ...Choices[]]) => void,
 ): (Node | false)[] {
   return [
     h('b', name),
     h('p', questionOf(error, choices) || error.detail || error.title),
     acceptButton(error, choices, onAgain),
-    ...choiceLists(asked, choices, source, onAgain),
+    ...choiceLists(asked, choices, stored, onAgain),
   ];
 }
 
 // `onAgain` has a refused one read once more, with other choices, or several times, with each of them.
 export function outcomeList(
   outcomes: readonly Outcome[],
-  source: Source,
+  stored: Gathered['stored'],
   onAgain: (outcome: Outcome, ...each: [Choices, ...Choices[]]) => void,
 ): HTMLElement {
   const row = (outcome: Outcome): HTMLElement => {
@@ -77,7 +78,7 @@ export function outcomeList(
     const name = member === dicomMember ? 'DICOM files' : member;
     return h('li', { 'data-member': member, class: !error ? 'stored' : questionOf(error, outcome.choices) ? 'asked' : 'refused' }, [
       ...(volume ? storedRow(volume, wasThere) : []),
-      ...(error ? refusedRow(error, name, outcome, source, (...each) => onAgain(outcome, ...each)) : []),
+      ...(error ? refusedRow(error, name, outcome, stored, (...each) => onAgain(outcome, ...each)) : []),
     ]);
   };
   const skipped = skippedText(outcomes.flatMap(({ volume }) => volume ?? []));

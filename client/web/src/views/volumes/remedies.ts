@@ -1,6 +1,6 @@
 // The options that a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../../api/problem';
-import type { Choice, Volume } from '../../api/types';
+import type { Choice } from '../../api/types';
 import { button, h, uniqueId } from '../../ui/dom';
 import { hashOf } from '../../ui/route';
 import { numbersOf } from '../../ui/numbers';
@@ -48,12 +48,12 @@ export function seriesOf(asked: Asked | null): string[] {
 }
 
 // Those that are not read yet.
-export function unread(asked: Asked | null, stored: ReadonlyMap<string, Volume>): string[] {
+export function unread(asked: Asked | null, stored: Stored): string[] {
   return seriesOf(asked).filter((uid) => !stored.has(uid));
 }
 
-// The files of an upload, and the series of it that were read.
-export type Source = Pick<Gathered, 'files' | 'stored'>;
+// The series of an upload that were read, by their UIDs.
+type Stored = Gathered['stored'];
 
 interface Row {
   choice: Choice;
@@ -94,7 +94,7 @@ function tree(rows: readonly Row[]): HTMLElement[] {
 function choiceList(
   parameter: Choice['parameter'],
   choices: readonly Choice[],
-  { files, stored }: Source,
+  stored: Stored,
   answered: string,
   onChoice: (...values: [string, ...string[]]) => void,
 ): HTMLElement {
@@ -108,9 +108,9 @@ function choiceList(
   };
   const rows = choices.map((choice): Row => {
     const { value, title } = choice;
-    const picture = choice.series?.picture;
+    const picture = choice.series && choice.picture;
     const thumbnail = picture && h('canvas', { 'aria-hidden': 'true' });
-    if (thumbnail) paintPicture({ ...picture, grey: Uint8ClampedArray.from(atob(picture.grey), (letter) => letter.charCodeAt(0)) }, thumbnail);
+    if (thumbnail) paintPicture(picture, thumbnail);
     const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), h('span.faint', studyOf(choice).date));
     const seen = h('span.choice', thumbnail, text);
     const volume = stored.get(value);
@@ -122,9 +122,7 @@ function choiceList(
   });
   const own = parameter === 'spacing' && h('li', spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
   const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...tree(rows), own, h('li', readMarked));
-  const [only] = files;
-  if (parameter !== 'volume' || !only || files.length > 1) return list;
-  return h('div.stack', timeChoice(choices, only.file, onChoice), list);
+  return parameter === 'volume' && choices.every(({ picture }) => picture) ? h('div.stack', timeChoice(choices, onChoice), list) : list;
 }
 
 // For the server, or why they cannot be sent.
@@ -170,12 +168,12 @@ function spacingForm(answered: string, onChoice: (value: string) => void): HTMLE
 export function choiceLists(
   asked: Asked | null,
   now: Choices,
-  source: Source,
+  stored: Stored,
   onChoices: (...each: [Choices, ...Choices[]]) => void,
 ): HTMLElement[] {
   if (!asked) return [];
   return [...choicesOf(asked.error)].map(([parameter, choices]) =>
-    choiceList(parameter, choices, source, now[parameter] ?? '', (...values) => {
+    choiceList(parameter, choices, stored, now[parameter] ?? '', (...values) => {
       const [first, ...others] = values.map((value) => ({ ...asked.choices, [parameter]: value }));
       if (first) onChoices(first, ...others);
     }),

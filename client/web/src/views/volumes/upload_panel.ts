@@ -69,16 +69,16 @@ export class UploadPanel {
     return this.running !== null;
   }
 
-  // Uploads them; after the upload that is under way.
-  take(files: NamedFile[]): void {
+  // Uploads them, with these choices; after the upload that is under way.
+  take(files: NamedFile[], choices?: Choices): void {
     const gathered = gather(files);
     if (!gathered) {
       if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files.'));
-    } else if (this.running) {
+    } else {
+      gathered.choices = choices;
+      if (!this.running) return void this.begin(gathered);
       this.waiting.push(gathered);
       this.showQueue();
-    } else {
-      void this.begin(gathered);
     }
   }
 
@@ -125,7 +125,7 @@ export class UploadPanel {
     // If the browser cannot read a file, the upload fails with the reason.
     const fault = await faultOf(gathered.files).catch(() => null);
     if (!fault) {
-      await this.send(gathered);
+      await this.send(gathered, { choices: gathered.choices });
       return;
     }
     this.running = null;
@@ -222,7 +222,7 @@ export class UploadPanel {
     };
     this.body.replaceChildren(
       h('div', { role: 'status' }, h('h2', moreSeries(rest)), h('p', gathered.name)),
-      ...choiceLists(asked, {}, gathered, (choices, ...next) => void this.send(gathered, { choices, asked, ...(next.length > 0 && { next }) })),
+      ...choiceLists(asked, {}, gathered.stored, (choices, ...next) => void this.send(gathered, { choices, asked, ...(next.length > 0 && { next }) })),
       h('div.actions', button('No more of these', no)),
     );
   }
@@ -300,7 +300,7 @@ export class UploadPanel {
       void this.send(gathered, { ...before, choices, asked, next: next.length > 0 ? next : undefined });
     const accept = acceptButton(error, known, sendWith);
     const question = questionOf(error, known);
-    const lists = choiceLists(asked, known, gathered, sendWith);
+    const lists = choiceLists(asked, known, gathered.stored, sendWith);
     if (question !== '' && !accept) {
       this.showQuestion(question, gathered, lists);
       return;
@@ -338,7 +338,7 @@ export class UploadPanel {
     const count = outcomes.reduce((sum, { asked }) => sum + Math.max(1, seriesOf(asked).length), 0);
     this.body.replaceChildren(
       h('h2', { role: 'status' }, `${stored} of ${count} volumes in the upload were stored`),
-      outcomeList(outcomes, gathered, ({ asked }, choices, ...next) => void this.send(gathered, { choices, asked, outcomes, next })),
+      outcomeList(outcomes, gathered.stored, ({ asked }, choices, ...next) => void this.send(gathered, { choices, asked, outcomes, next })),
       ...(mayBeMasks(outcomes) ? [this.masksQuestion(gathered)] : []),
       h('div.actions', button('Upload another', () => {
         this.showIdle();

@@ -168,7 +168,7 @@ class Home {
   ]);
   private readonly noVolumes = h('li.empty', [
     h('p', 'No volumes yet. Drop a file above, or'),
-    button('try a sample', () => void import('../../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()]), tellError), {
+    button('try a sample', () => void import('../../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()], { modality: 'ct' }), tellError), {
       class: 'link',
       title: 'Makes and uploads a simple head of 112 \u00d7 112 \u00d7 112 samples',
     }),
