@@ -407,7 +407,7 @@ Mask mask_of(const FoundVolume& found, Members& members) {
     if (!folder.empty()) file = folder.substr(0, folder.size() - 1);
   }
   return {std::move(file), [&](const ImportTask& task) {
-            static const FormatListener kNobody;
+            static const FormatListener nobody;
             members.complete(found);
             // Only for the files that a header names: no table of labels belongs to a mask.
             const bool has_data = found.reader->data_names != nullptr;
@@ -416,7 +416,7 @@ Mask mask_of(const FoundVolume& found, Members& members) {
                 {.path = found.member.path,
                  .companions = has_data ? members.companions_of(found.member.name) : Companions(),
                  .task = task,
-                 .listener = kNobody});
+                 .listener = nobody});
           }};
 }
 
