@@ -166,7 +166,7 @@ bool PreviewNrrd::is_reduced() const {
 void PreviewNrrd::write_layer() {
   constexpr std::uint32_t kReach = ThinParts::kReach;
   const std::size_t first = read_ - layers_.size();
-  std::array<const ThinParts::KnownLayer*, 2 * kReach + 1> around = {};
+  ThinParts::NeighbouringLayers around = {};
   for (std::uint32_t at = 0; at < around.size(); ++at) {
     const std::uint32_t layer = std::max(written_ + at, kReach) - kReach;
     around[at] = &layers_[std::min(layer, read_ - 1) - first];

@@ -57,7 +57,7 @@ class PreviewNrrd {
   bool has_begun_ = false;
   std::uint32_t row_ = 0;
   std::uint32_t slice_ = 0;
-  // Of each block of the layer that is read.
+  // Each block of the layer that is read has one of these.
   std::vector<double> sums_;
   std::vector<double> least_;
   std::vector<double> greatest_;

@@ -5,16 +5,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 namespace isomesh::volume {
 
-// What is thinner than two blocks, brighter or darker than all around, gets its own value; all else
-// keeps the means.
+// Parts that are thinner than two blocks, brighter or darker than all around, get their own value;
+// all else keeps the means.
 class ThinParts {
  public:
-  // Of one layer, or what is derived of it.
+  // One layer, or something that is derived of it.
   using Greys = std::vector<std::uint8_t>;
 
   // Greys of the blocks of one layer, row by row.
@@ -29,10 +28,10 @@ class ThinParts {
   // Layers on either side that tell what a layer becomes.
   static constexpr std::size_t kReach = 2;
 
-  // What is known of a layer for its neighbours.
+  // A layer as it and its neighbours need it. All but the means have a border of kReach, which
+  // repeats the last values; dark ones are subtracted from 255.
   struct KnownLayer {
-    Layer layer;
-    // With a border of kReach, which repeats the last values; dark ones are subtracted from 255.
+    Greys mean;
     Greys bright;
     Greys dark;
     // The least of each square of two by two, of what is bright and of what is dark.
@@ -40,14 +39,16 @@ class ThinParts {
     Greys dark_squares;
   };
 
+  using NeighbouringLayers = std::array<const KnownLayer*, 2 * kReach + 1>;
+
   KnownLayer known(Layer layer) const;
 
   // The layer in the middle of its neighbours; at the ends of the volume the last one is repeated.
-  Greys kept(const std::array<const KnownLayer*, 2 * kReach + 1>& around) const;
+  Greys kept(const NeighbouringLayers& around) const;
 
  private:
-  Greys bordered(const Greys& plane, bool is_inverted) const;
-  Greys squares(const Greys& bordered) const;
+  // Each value with the bits of `mask` turned over.
+  Greys bordered(const Greys& plane, std::uint8_t mask) const;
 
   std::size_t stride() const { return width_ + 2 * kReach; }
 

@@ -49,7 +49,7 @@ function queryOf(values: Readonly<Record<string, string | number | undefined>>):
   return given.length === 0 ? '' : `?${new URLSearchParams(given.map(([name, value]) => [name, String(value)])).toString()}`;
 }
 
-// What all pages of a list hold.
+// All that the pages of a list hold.
 async function allPages<Page extends { next: string | null }, T>(pageAt: (cursor: string) => Promise<Page>, held: (page: Page) => T[]): Promise<T[]> {
   const all: T[] = [];
   for (let cursor: string | null = ''; cursor !== null; ) {

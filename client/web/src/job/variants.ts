@@ -11,16 +11,20 @@ import { labelsOfMesh } from './labels';
 import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInNames, surfaceInWords, variantOf, withGlb } from './parameters';
 import { forPrinting } from './printing';
 
-// Makes the same surface with other parameters, or finds it made already.
-export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
-  const parameters = variantOf(job.parameters, variant);
-  const { jobs } = await client.listJobs('', { state: 'succeeded', volume: job.volume });
+// Finds a surface among the newest of its volume that was made with these parameters, or makes it.
+async function found(parameters: JobParameters): Promise<Job> {
+  const { jobs } = await client.listJobs('', { state: 'succeeded', volume: parameters.volume });
   return jobs.find((made) => isSameJob(made.parameters, parameters)) ?? client.submitJob(jobRequest(parameters));
+}
+
+// The same surface with other parameters.
+export function submitVariant({ parameters }: Job, variant: Partial<JobParameters>): Promise<Job> {
+  return found(variantOf(parameters, variant));
 }
 
 // The same surface, for a printer.
 export function makePrintable({ parameters }: Job, spacing: readonly number[]): void {
-  client.submitJob(jobRequest(forPrinting(parameters, spacing))).then(started, tellError);
+  found(forPrinting(parameters, spacing)).then(started, tellError);
 }
 
 function started({ id, state }: Job): void {

@@ -86,7 +86,7 @@ export function packedNormals(sums: Float32Array): Int16Array<ArrayBuffer> {
 
 // All blocks of a surface share one grid, so that a vertex on a seam has the same bits in every block that names it.
 export function placeKey(positions: Float32Array, vertex: number): string {
-  return positions.subarray(3 * vertex, 3 * vertex + 3).join();
+  return String.fromCharCode(...new Uint16Array(positions.buffer, positions.byteOffset + 12 * vertex, 6));
 }
 
 // The vertices of edges whose other direction no triangle has. At most 65 535 vertices.

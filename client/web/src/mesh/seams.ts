@@ -6,7 +6,7 @@ type Sum = [number, number, number];
 
 export class Seams {
   private readonly sums = new Map<string, Sum>();
-  // Of each block, the sums of its border's places.
+  // Each block with the sums of its border's places.
   private readonly members: { block: Block; sums: Sum[] }[] = [];
 
   add(block: Block): void {

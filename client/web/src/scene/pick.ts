@@ -1,5 +1,5 @@
-// Where a ray meets triangles. A tree of boxes (three-mesh-bvh) finds the place at once where it is there, but building it takes as
-// long as a hundred searches through all triangles that a ray may meet, and a person measures with a few.
+// The place where a ray meets triangles. A tree of boxes (three-mesh-bvh) finds it at once if the tree is there, but building one takes
+// as long as many searches through all triangles that a ray may meet, and a person measures with a few.
 import { Vector3, type Plane, type Ray } from 'three';
 
 // Parts of a ray, in lengths of its direction.
