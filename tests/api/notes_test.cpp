@@ -283,8 +283,13 @@ TEST_F(NotesTest, ARefusalOffersTheVolumesOfAFile) {
   const std::string file = two_times();
   const Answer open = daemon_.send("POST", "/v1/volumes", file);
   EXPECT_EQ(open.status, 422);
-  EXPECT_THAT(problem_from_json(open.body).remedy.choices,
-              ElementsAre(Choice{"volume", "0", "time 0"}, Choice{"volume", "1", "time 1"}));
+  const std::vector<Choice> choices = problem_from_json(open.body).remedy.choices;
+  EXPECT_THAT(choices, ElementsAre(testing::Field(&Choice::title, "time 0"),
+                                   testing::Field(&Choice::title, "time 1")));
+  for (const Choice& choice : choices) {
+    EXPECT_EQ(choice.parameter, "volume");
+    EXPECT_TRUE(choice.picture) << choice.value;
+  }
   EXPECT_EQ(daemon_.send("POST", "/v1/volumes?volume=1", file).status, 201);
   EXPECT_EQ(daemon_.send("POST", "/v1/mesh?volume=1&iso=110&format=stl", file).status, 200);
   EXPECT_EQ(daemon_.send("POST", "/v1/mesh?iso=110&format=stl", file).status, 422);

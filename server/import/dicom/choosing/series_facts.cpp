@@ -10,7 +10,7 @@
 #include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/pixels/pixels.h"
 #include "server/import/dicom/pixels/values.h"
-#include "server/import/samples/choice_pictures.h"
+#include "server/import/source/choice_picture.h"
 
 namespace isomesh::import::dicom {
 namespace {

@@ -1,13 +1,10 @@
-// Small pictures by which a person tells apart what an error offers.
+// A small picture by which a person tells apart what an error offers.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <span>
 
-#include "base/files.h"
 #include "proto/error.h"
-#include "server/import/source/source.h"
 
 namespace isomesh::import {
 
@@ -26,11 +23,5 @@ GreyWindow window_of(std::span<const double> values);
 // Values that are not finite are black.
 ChoicePicture picture_of(std::span<const double> values, std::uint32_t width,
                          const GreyWindow& window);
-
-// Returns the error, which offers the volumes of a file, with the middle slice of each, all by the
-// window of the first; `source` describes the first. They are smaller the more there are. Without
-// pictures if the samples are not plain and one volume after the other, or cannot be read.
-Error with_pictures(const Error& error, const InputFile& file, const SourceVolume& source,
-                    const std::filesystem::path& scratch);
 
 }  // namespace isomesh::import

@@ -1,22 +1,18 @@
-#include "server/import/samples/choice_pictures.h"
+#include "server/import/samples/volume_pictures.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <iterator>
 #include <optional>
-#include <ranges>
 #include <utility>
 #include <vector>
 
-#include "base/base64.h"
 #include "server/import/samples/payload.h"
+#include "server/import/source/choice_picture.h"
 
 namespace isomesh::import {
 namespace {
 
-constexpr double kDarkest = 0.02;  // shares of the pixels
-constexpr double kBrightest = 0.99;
 constexpr double kMostPixels = double{1 << 20};  // of all pictures of an error
 
 // The first or second axis of a slice runs against the direction in which pictures of patients are
@@ -77,31 +73,6 @@ class MiddleSlices {
 };
 
 }  // namespace
-
-GreyWindow window_of(std::span<const double> values) {
-  std::vector<double> finite;
-  std::ranges::copy_if(values, std::back_inserter(finite),
-                       [](double value) { return std::isfinite(value); });
-  if (finite.empty()) return {};
-  std::ranges::sort(finite);
-  const auto at = [&](double share) {
-    return finite[static_cast<std::size_t>(share * static_cast<double>(finite.size() - 1))];
-  };
-  return {at(kDarkest), std::max(at(kBrightest) - at(kDarkest), 1e-9)};
-}
-
-ChoicePicture picture_of(std::span<const double> values, std::uint32_t width,
-                         const GreyWindow& window) {
-  std::vector<std::uint8_t> grey;
-  for (const double value : values) {
-    const double part = (value - window.black) / window.width;
-    const double share = std::isfinite(value) ? std::clamp(part, 0.0, 1.0) : 0.0;
-    grey.push_back(static_cast<std::uint8_t>(std::lround(255 * share)));
-  }
-  return {.width = width,
-          .height = static_cast<std::uint32_t>(values.size() / width),
-          .grey = to_base64(grey)};
-}
 
 Error with_pictures(const Error& error, const InputFile& file, const SourceVolume& source,
                     const std::filesystem::path& scratch) {
