@@ -10,8 +10,8 @@
 #include "server/import/images/tiff.h"
 #include "server/import/labels_beside.h"
 #include "server/import/members.h"
-#include "server/import/samples/volume_pictures.h"
 #include "server/import/samples/transfer.h"
+#include "server/import/samples/volume_pictures.h"
 #include "server/import/source/gzip.h"
 
 namespace isomesh::import {
