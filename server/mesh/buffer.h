@@ -18,17 +18,23 @@ struct FreeMemory {
 template <class T>
 using LargeArray = std::unique_ptr<T[], FreeMemory>;
 
+inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
+inline constexpr std::size_t kCacheLine = 64;
+
+// A block of memory for so many bytes: whole cache lines, or whole huge pages.
+constexpr std::size_t block_bytes(std::size_t bytes) {
+  const std::size_t unit = bytes >= kHugePage ? kHugePage : kCacheLine;
+  return (bytes + unit - 1) / unit * unit;
+}
+
 // Indeterminate elements, aligned to a cache line at least. Large arrays ask for huge pages: their
 // first pages cost a third of what small ones do, and walks in no order that a translation buffer
 // could follow are faster ever after. Throws std::bad_alloc.
 template <class T>
 LargeArray<T> allocate_for_overwrite(std::size_t count) {
   static_assert(std::is_trivially_destructible_v<T>);
-  constexpr std::size_t kHugePage = std::size_t{2} << 20;
-  constexpr std::size_t kCacheLine = 64;
-  const std::size_t bytes = count * sizeof(T);
-  const std::size_t unit = bytes >= kHugePage ? kHugePage : kCacheLine;
-  const std::size_t rounded = (bytes + unit - 1) / unit * unit;
+  const std::size_t rounded = block_bytes(count * sizeof(T));
+  const std::size_t unit = rounded >= kHugePage ? kHugePage : kCacheLine;
   LargeArray<T> array(static_cast<T*>(std::aligned_alloc(unit, rounded)));
   if (!array) throw std::bad_alloc();
   // Only a wish: without huge pages everything works, more slowly.

@@ -32,6 +32,17 @@ mesh::Mesh extracted(const SampleVolume<T>& volume, const mesh::ExtractOptions& 
   return mesh;
 }
 
+// The size of a surface of equal layers.
+inline mesh::SurfaceSize even_surface(std::uint64_t layers, std::uint64_t vertices_each,
+                                      std::uint64_t triangles_each) {
+  mesh::SurfaceCount count;
+  for (std::uint64_t k = 1; k <= layers; ++k) {
+    count.layer_vertices.push_back(k * vertices_each);
+    count.layer_triangles.push_back(k * triangles_each);
+  }
+  return size_of(count);
+}
+
 // Passes of steps to the mean of the neighbours, or away from it, by these weights.
 inline std::vector<mesh::Step> means(int passes, const std::vector<double>& weights) {
   std::vector<mesh::Step> steps;

@@ -46,7 +46,7 @@ void visit(Is<CountedSurface> auto& self, auto&& field) {
   field("triangles", self.size.triangles);
   field("vertices", self.size.vertices);
   field("layers", self.size.layers);
-  field("largest_layer", self.size.largest_layer);
+  field("largest_runs", self.size.largest_runs);
   field("labels", self.labels);
 }
 

@@ -13,6 +13,7 @@
 #include "server/mesh/parallel.h"
 #include "server/mesh/smooth/untangle.h"
 #include "server/mesh/stairs/stairs.h"
+#include "server/mesh/topology/window_topology.h"
 #include "server/mesh/walk/walk.h"
 
 namespace isomesh::jobs {
@@ -23,25 +24,29 @@ std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
 }
 
 // The memory of a job that never has the surface as a whole: the walk, its files, the joined
-// crossings until they are set aside, and for each thread the corners of some layers'
-// triangles, whose fans it looks at.
+// crossings if they are not set aside, and for each thread the topology of a window.
 std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                            const MeshParameters& parameters) {
   // With the room that arrays grow into.
   constexpr std::uint64_t kJoinedPerVertex = 16;
-  constexpr std::uint64_t kCornersPerVertex = 5 * 2 * 3 * 8;
-  const std::uint64_t planes = std::max<std::uint64_t>(1, surface.layers);
-  const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
+  // Measured: what the C library keeps of freed blocks takes up to a third of those in use, with
+  // the surfaces whose bounds here are the closest; a fifth of the bounds covers it.
+  constexpr std::uint64_t kHoles = 5;
+  const std::uint64_t plane = samples / std::max<std::uint64_t>(1, surface.layers);
+  const bool is_set_aside = sets_aside(samples);
   std::uint64_t files = 0;
   for (const MeshFormat format : files_of(parameters)) {
-    files += codec::walked_memory(format, parameters, surface, sets_aside(samples));
+    files += codec::walked_memory(format, parameters, surface, is_set_aside);
   }
-  const std::uint64_t layer = std::min(surface.vertices, surface.largest_layer);
-  const std::uint64_t joining = sets_aside(samples) ? threads * layer : surface.vertices;
-  return mesh::walking_memory(walk_options(smooth_options(parameters), parameters, surface),
-                              surface, samples / planes) +
-         files + threads * layer * kCornersPerVertex +
-         (parameters.regularize ? joining * kJoinedPerVertex : 0);
+  mesh::WritingMemory writing = mesh::writing_memory(
+      {.scheme = scheme_of(parameters.scheme), .regularize = is_regularized(parameters)}, plane);
+  if (!is_set_aside) writing.vertex_bytes = 0;
+  const std::uint64_t joined = parameters.regularize && !is_set_aside ? surface.vertices : 0;
+  const mesh::WalkOptions options = walk_options(smooth_options(parameters), parameters, surface);
+  const std::uint64_t needed =
+      mesh::walking_memory(options, surface, writing) + files + joined * kJoinedPerVertex +
+      static_cast<std::uint64_t>(mesh::thread_count()) * mesh::WindowTopology::bytes(surface);
+  return needed + needed / kHoles;
 }
 
 // The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,

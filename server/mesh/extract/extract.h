@@ -29,6 +29,7 @@
 // of the volume's box that are next to a sample of about the iso-value.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -58,7 +59,12 @@ struct SurfaceSize {
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t layers = 0;
-  std::uint64_t largest_layer = 0;  // in vertices
+  // In vertices: the largest of one layer, of two that follow each other, and so on.
+  std::array<std::uint64_t, 33> largest_runs = {};
+
+  std::uint64_t largest_layer() const { return largest_runs.front(); }
+  // At least the vertices of any so many layers that follow each other.
+  std::uint64_t most_vertices(std::uint64_t in_layers) const;
 };
 
 SurfaceSize size_of(const SurfaceCount& count);

@@ -130,8 +130,7 @@ void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& co
 
 // Pass 3, write: the slab's vertices and triangles go to their places, which mesh.layer_vertices
 // and mesh.layer_triangles tell. Reads joined crossings of the planes [begin, end + 2), and of the
-// next plane those of the first row.
-inline constexpr std::uint32_t kJoinedLayersBehind = 3;
+// next plane those of the first row: kJoinedLayersBehind.
 void write_slab(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
 
 }  // namespace isomesh::mesh

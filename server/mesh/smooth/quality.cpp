@@ -182,7 +182,7 @@ std::uint64_t quality_memory(const SurfaceSize& size) {
   // While rings are sorted and slabs are coloured, for each thread: six triangles a vertex.
   constexpr std::uint64_t kOfLayer = 6 * 2 * sizeof(std::uint32_t) + 2 * sizeof(std::uint64_t);
   return Rings::bytes(size.vertices, size.triangles) + size.vertices * kVertex +
-         static_cast<std::uint64_t>(thread_count()) * size.largest_layer * kOfLayer;
+         static_cast<std::uint64_t>(thread_count()) * size.largest_layer() * kOfLayer;
 }
 
 }  // namespace isomesh::mesh

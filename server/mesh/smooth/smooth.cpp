@@ -50,7 +50,7 @@ Plan plan_for(const SmoothOptions& options, const SurfaceSize& size) {
     const auto at_once = std::min(plan.runs, static_cast<std::size_t>(thread_count()));
     const std::uint64_t copied =
         plan.runs * (2 * steps_at_once + kBelowRun + kAboveRun) * sizeof(Vec3);
-    return size.largest_layer * (at_once * step_bytes_per_vertex(steps_at_once) + copied);
+    return size.largest_layer() * (at_once * step_bytes_per_vertex(steps_at_once) + copied);
   };
   const std::size_t rounds = (steps + kUsualSteps - 1) / kUsualSteps;
   const std::uint64_t several =
@@ -163,7 +163,7 @@ class Smoother {
   void run_round(std::size_t number) {
     const std::size_t steps = options_.steps.size();
     const Round round = {options_, plan_.first_step(number, steps),
-                         plan_.first_step(number + 1, steps), size_.largest_layer};
+                         plan_.first_step(number + 1, steps), size_.largest_layer()};
     std::vector<std::optional<CopiedRun>> copied(runs_.size());
     parallel_for(quiet_, runs_.size(),
                  [&](std::size_t i) { copied[i].emplace(*this, round, runs_[i]); });

@@ -140,6 +140,12 @@ WindowTopology::WindowTopology(const Mesh& window, std::span<const Triangle> bel
   behind = of_layer(window.layers() - 1);
 }
 
+std::uint64_t WindowTopology::bytes(const SurfaceSize& surface) {
+  // Six triangles, and the end of their list.
+  constexpr std::uint64_t kPerVertex = 6 * sizeof(Corner) + sizeof(std::uint32_t);
+  return block_bytes(surface.most_vertices(kLayersPerPart) * kPerVertex);
+}
+
 // The layer behind a window is the first of the next: each of its vertices joins two components
 // that may be one already.
 void TopologySum::add(const WindowTopology& window) {

@@ -6,15 +6,18 @@
 #include <vector>
 
 #include "server/mesh/context.h"
+#include "server/mesh/extract/extract.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/topology/topology.h"
 
 namespace isomesh::mesh {
 
-// Facts about a window of a mesh (SurfaceWindows::write), found on its triangles and on those of
+// Facts about a window of a mesh (LayerSource::write), found on its triangles and on those of
 // the layer below it. These have the window's numbers, modulo 2^32. Thread safe.
 struct WindowTopology {
   WindowTopology(const Mesh& window, std::span<const Triangle> below, const Context& context);
+  // The memory in which it is found, but for the window's; an upper bound.
+  static std::uint64_t bytes(const SurfaceSize& surface);
 
   Topology fans;                 // of the window's own vertices
   std::uint32_t components = 0;  // of all its vertices

@@ -20,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // Deeper windows number fewer planes twice, flatter ones take less memory.
-constexpr std::uint64_t kUsualTriangles = std::uint64_t{1} << 19;  // of a window
+constexpr std::uint64_t kUsualTriangles = std::uint64_t{1} << 18;  // of a window
 constexpr std::uint32_t kFewestLayers = 4;
 constexpr std::uint32_t kMostLayers = 32;
 // A vertex stays where it is when so many layers behind it have been moved by all steps.
@@ -47,8 +47,8 @@ std::size_t windows_at_once(const WalkOptions& options, std::uint32_t depth) {
 
 class Walk {
  public:
-  Walk(SurfaceWindows& surface, const WalkOptions& options, const Context& context,
-       WindowUser& user, std::uint32_t depth)
+  Walk(LayerSource& surface, const WalkOptions& options, const Context& context, WindowUser& user,
+       std::uint32_t depth)
       : surface_(surface),
         context_(context),
         user_(user),
@@ -61,7 +61,7 @@ class Walk {
         results_(surface.layers()),
         layers_{[this](std::ptrdiff_t layer) { return view(layer); }, results_},
         steps_({options.smooth, 0, options.smooth.steps.size(),
-                size_of(surface.count()).largest_layer},
+                size_of(surface.count()).largest_layer()},
                {0, layers_.count()}, layers_),
         flat_(layers_),
         written_(count_, false) {
@@ -250,7 +250,9 @@ class Walk {
       const std::size_t last = below.layers() - 2;
       user_.see_extracted(below, below.layer_triangles[last], below.layer_triangles[last + 1]);
       const auto behind = static_cast<std::uint32_t>(below.layer_vertices[last + 1]);
-      for (const auto& [a, b, c] : below.triangles_of(last, last + 1)) {
+      const auto triangles = below.triangles_of(last, last + 1);
+      own.below.reserve(triangles.size());
+      for (const auto& [a, b, c] : triangles) {
         own.below.push_back({a - behind, b - behind, c - behind});
       }
       surface_.forget(begin_of(window - 1), end_of(window - 1));
@@ -304,7 +306,7 @@ class Walk {
     }
   }
 
-  SurfaceWindows& surface_;
+  LayerSource& surface_;
   const Context& context_;
   WindowUser& user_;
   const std::size_t threads_;
@@ -348,24 +350,28 @@ bool can_walk(const SmoothOptions& options) {
   return options.steps.empty() || options.steps.front().move == Move::kMean;
 }
 
-WalkEnd walk(SurfaceWindows& surface, const WalkOptions& options, const Context& context,
+WalkEnd walk(LayerSource& surface, const WalkOptions& options, const Context& context,
              WindowUser& user) {
   const std::uint32_t depth = depth_of(options, surface.count().triangles(), surface.layers());
   return Walk(surface, options, context, user, depth).run();
 }
 
 std::uint64_t walking_memory(const WalkOptions& options, const SurfaceSize& size,
-                             std::uint64_t plane_samples) {
+                             const WritingMemory& writing) {
+  if (size.vertices == 0) return 0;
+  const auto threads = static_cast<std::uint64_t>(thread_count());
   const std::uint32_t depth = depth_of(options, size.triangles, size.layers);
-  const std::uint64_t windows = windows_at_once(options, depth);
-  const std::uint64_t vertices = std::min(size.vertices, (depth + 1) * size.largest_layer);
+  const std::uint64_t windows =
+      std::min<std::uint64_t>((size.layers + depth - 1) / depth, windows_at_once(options, depth));
+  const std::uint64_t vertices = size.most_vertices(std::uint64_t{depth} + 1);
   // An open plane of triangles has two a vertex.
-  const std::uint64_t vertex_bytes =
-      (options.normals ? 2 : 1) * sizeof(Vec3) + 2 * sizeof(Triangle);
-  constexpr std::uint64_t kIndexBytes = 8 * sizeof(std::uint32_t);  // a sample
-  return windows * vertices * vertex_bytes +
-         size.largest_layer * step_bytes_per_vertex(options.smooth.steps.size()) +
-         static_cast<std::uint64_t>(thread_count()) * plane_samples * kIndexBytes;
+  constexpr std::uint64_t kTriangles = 2 * sizeof(Triangle);
+  const std::uint64_t vectors = block_bytes(vertices * sizeof(Vec3)) * (options.normals ? 2 : 1);
+  const std::uint64_t window =
+      vectors + block_bytes(vertices * kTriangles) + size.largest_layer() * kTriangles;
+  const std::uint64_t written = size.most_vertices(windows * depth + kJoinedLayersBehind);
+  return windows * window + written * writing.vertex_bytes + threads * writing.thread_bytes +
+         size.largest_layer() * step_bytes_per_vertex(options.smooth.steps.size());
 }
 
 }  // namespace isomesh::mesh

@@ -25,7 +25,7 @@ struct Window {
   std::uint32_t first_layer = 0;  // of the surface, as the next two
   std::uint64_t first_vertex = 0;
   std::uint64_t first_triangle = 0;
-  // As SurfaceWindows::write leaves it, then with the vertices of the layer behind it.
+  // As LayerSource::write leaves it, then with the vertices of the layer behind it.
   Mesh mesh;
   // The triangles of the layer below the window, by its numbers, modulo 2^32.
   std::vector<Triangle> below;
@@ -75,12 +75,12 @@ bool can_walk(const SmoothOptions& options);
 // Walks through the surface. The result, and what the user sees and does in order, does not depend
 // on the number of threads, nor on the depth of windows. Throws Error kCancelled, after a window's
 // stage at the latest, and what the user throws.
-WalkEnd walk(SurfaceWindows& surface, const WalkOptions& options, const Context& context,
+WalkEnd walk(LayerSource& surface, const WalkOptions& options, const Context& context,
              WindowUser& user);
 
-// An upper bound of the memory of a walk, in bytes, with the present number of threads, in a volume
-// whose planes have so many samples. Without the user's.
+// An upper bound of the memory of a walk, in bytes, with the present number of threads. Without the
+// user's.
 std::uint64_t walking_memory(const WalkOptions& options, const SurfaceSize& size,
-                             std::uint64_t plane_samples);
+                             const WritingMemory& writing);
 
 }  // namespace isomesh::mesh

@@ -24,6 +24,8 @@ namespace {
 using test::means;
 using Bytes = test::SampleVolume<std::uint8_t>;
 
+constexpr std::uint64_t kAll32 = std::uint64_t{1} << 32;
+
 // The user of a walk for one file.
 class OneFile : public mesh::WindowUser {
  public:
@@ -43,6 +45,26 @@ class OneFile : public mesh::WindowUser {
   WalkedFile& file_;
 };
 
+// Layers behind so many vertices, as if others came before them.
+class Behind : public mesh::LayerSource {
+ public:
+  Behind(mesh::LayerSource& layers, std::uint64_t vertices) : layers_(layers) {
+    count_.layer_vertices = layers.count().layer_vertices;
+    count_.layer_triangles = layers.count().layer_triangles;
+    for (std::uint64_t& sum : count_.layer_vertices) sum += vertices;
+  }
+
+  const mesh::SurfaceCount& count() const override { return count_; }
+  void write(std::uint32_t begin, std::uint32_t end, mesh::Mesh& mesh) override {
+    layers_.write(begin, end, mesh);
+  }
+  void forget(std::uint32_t begin, std::uint32_t end) override { layers_.forget(begin, end); }
+
+ private:
+  mesh::LayerSource& layers_;
+  mesh::SurfaceCount count_;
+};
+
 struct Case {
   const Bytes& volume;
   mesh::ExtractOptions extract;
@@ -50,7 +72,8 @@ struct Case {
   MeshParameters parameters = {};
   std::size_t triangles_per_block = 300;
   mesh::Spool* spool = nullptr;
-  float shrunk = 0;  // by how much less than the surface's is the expected box
+  float shrunk = 0;          // by how much less than the surface's is the expected box
+  std::uint64_t behind = 0;  // so many vertices
   int walks = 0;
 };
 
@@ -72,7 +95,8 @@ std::string walked(Case& one, MeshFormat format) {
   std::unique_ptr<WalkedFile> file;
   do {
     mesh::SurfaceWindows windows(lattice, one.extract, {}, one.spool);
-    const mesh::SurfaceSize size = size_of(windows.count());
+    Behind source(windows, one.behind);
+    const mesh::SurfaceSize size = size_of(source.count());
     const BlockCut cut(size.triangles, size.layers, one.triangles_per_block);
     if (!file) {
       mesh::Reach reach = windows.reach();
@@ -82,7 +106,7 @@ std::string walked(Case& one, MeshFormat format) {
           {provenance, format, size, reach, sink, one.spool, {}, one.triangles_per_block});
     }
     OneFile user(*file);
-    walk(windows, {one.smooth, static_cast<std::uint32_t>(cut.depth), true}, {}, user);
+    walk(source, {one.smooth, static_cast<std::uint32_t>(cut.depth), true}, {}, user);
     ++one.walks;
   } while (!file->end(topology));
   return bytes;
@@ -202,6 +226,23 @@ TEST(WalkedGlb, TakesTheBoxOfTheSurfaceIfThatIsNotTheExpectedOne) {
   mesh::Mesh mesh = whole(one);
   mesh.reach = {};
   EXPECT_TRUE(triangles == triangles_in(encoded_whole(one, mesh)));
+}
+
+// Only numbers of one window have to fit 32 bits.
+TEST(WalkedFile, TakesMoreVerticesThanHave32Bits) {
+  const Bytes volume = balls();
+  Case one = {volume, {.iso = 60, .regularize = true}, {.steps = means(5, {1})}};
+  one.parameters.glb_codec = GlbCodec::kMeshopt;
+  for (const MeshFormat format : {MeshFormat::kStl, MeshFormat::kGlb}) {
+    one.behind = 0;
+    const std::string bytes = walked(one, format);
+    for (const std::uint64_t behind : {kAll32 - 100, kAll32, 3 * kAll32}) {
+      one.behind = behind;
+      EXPECT_TRUE(walked(one, format) == bytes);
+    }
+  }
+  one.parameters.glb_codec = GlbCodec::kNone;
+  EXPECT_EQ(test::code_thrown_by([&] { walked(one, MeshFormat::kGlb); }), ErrorCode::kTooLarge);
 }
 
 TEST(WalkedGlb, SaysThatTheSpoolIsFull) {

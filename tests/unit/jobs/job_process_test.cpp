@@ -136,7 +136,7 @@ TEST_F(JobProcessTest, CountsTheSurfaceThatItWouldMake) {
   EXPECT_EQ(size.triangles, made.summary.triangles);
   EXPECT_EQ(size.vertices, made.summary.vertices);
   EXPECT_GT(size.layers, 0U);
-  EXPECT_GT(size.largest_layer, 0U);
+  EXPECT_GT(size.largest_layer(), 0U);
 }
 
 TEST_F(JobProcessTest, AJobThatIsStoppedEndsAndTheNextOneRunsInTheSameProcess) {
@@ -269,13 +269,13 @@ TEST(JobMessage, ArrivesAsItWasSent) {
 
 TEST(JobMessage, ACountComesAsItWent) {
   CountedSurface counted = {
-      .size = {.triangles = 1, .vertices = 2, .layers = 3, .largest_layer = 4},
+      .size = {.triangles = 1, .vertices = 2, .layers = 3, .largest_runs = {1, 2}},
       .labels = {{.label = -5, .triangles = 6}}};
   const auto again = std::get<CountedSurface>(answer_from(to_line(counted)));
   EXPECT_EQ(again.size.triangles, 1U);
   EXPECT_EQ(again.size.vertices, 2U);
   EXPECT_EQ(again.size.layers, 3U);
-  EXPECT_EQ(again.size.largest_layer, 4U);
+  EXPECT_EQ(again.size.largest_runs, counted.size.largest_runs);
   EXPECT_EQ(again.labels, counted.labels);
   const JobProgress progress = {
       .stage = Stage::kSmooth, .share = 0.25, .timing = {.load = 1, .extract = 2}};

@@ -90,10 +90,8 @@ TEST(CanBeWalked, OnlyWithoutWhatNeedsTheWholeSurface) {
 }
 
 TEST(IsWalked, UnlessASmallSurfaceHasTooFewWindowsForTheThreads) {
-  const mesh::SurfaceSize small = {
-      .triangles = 150'000, .vertices = 75'000, .layers = 128, .largest_layer = 800};
-  const mesh::SurfaceSize large = {
-      .triangles = 15'000'000, .vertices = 7'500'000, .layers = 512, .largest_layer = 16'000};
+  const mesh::SurfaceSize small = test::even_surface(128, 600, 1200);
+  const mesh::SurfaceSize large = test::even_surface(512, 15'000, 30'000);
   MeshParameters parameters;
   for (const MeshFormat format : {MeshFormat::kGlb, MeshFormat::kStl}) {
     parameters.formats = {format};
@@ -114,10 +112,8 @@ TEST(IsWalked, UnlessASmallSurfaceHasTooFewWindowsForTheThreads) {
 TEST(EstimateMemory, FollowsTheLayerOfAWalk) {
   MeshParameters parameters;
   parameters.formats = {MeshFormat::kStl, MeshFormat::kGlb};
-  const mesh::SurfaceSize surface = {
-      .triangles = 60'000'000, .vertices = 30'000'000, .layers = 1024, .largest_layer = 45'000};
-  const mesh::SurfaceSize twice = {
-      .triangles = 120'000'000, .vertices = 60'000'000, .layers = 2048, .largest_layer = 45'000};
+  const mesh::SurfaceSize surface = test::even_surface(1024, 30'000, 60'000);
+  const mesh::SurfaceSize twice = test::even_surface(2048, 30'000, 60'000);
   const std::uint64_t samples = std::uint64_t{1} << 30;
   const std::uint64_t needed = estimate_memory(surface, samples, parameters, false);
   EXPECT_LT(needed, std::uint64_t{700} << 20);

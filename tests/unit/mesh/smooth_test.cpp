@@ -403,13 +403,12 @@ TEST(SmoothWithin, KeepsMovesAlongTheSurfaceOnTheirSideOfTheCaps) {
 TEST(SmoothMemory, IsAFewLayersWhenTheVolumeIsDeep) {
   const test::ThreadCount two(2);
   const auto size = [](std::uint64_t layers, std::uint64_t vertices_each) {
-    return SurfaceSize{
-        .vertices = layers * vertices_each, .layers = layers, .largest_layer = vertices_each};
+    return test::even_surface(layers, vertices_each, 2 * vertices_each);
   };
   const SurfaceSize deep = size(1024, 1000);
   const std::uint64_t five = smoothing_memory({means(5, {1})}, deep);
   EXPECT_EQ(five, smoothing_memory({means(5, {1})}, size(512, 1000)));
-  EXPECT_LT(five, 2000 * deep.largest_layer);
+  EXPECT_LT(five, 2000 * deep.largest_layer());
   // Twenty at once, rather than a copy of everything.
   EXPECT_LT(smoothing_memory({means(20, {1})}, deep), deep.vertices * sizeof(Vec3));
   // On a shallow one never much more than that copy.

@@ -11,6 +11,7 @@
 #include "server/mesh/extract/joined_layers.h"
 #include "server/mesh/extract/slab_passes.h"
 #include "server/mesh/lattice/bcc_faces.h"
+#include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/memory_spool.h"
 #include "tests/support/mesh_checks.h"
@@ -108,6 +109,38 @@ TEST(WriteSlab, ReadsJoinedCrossingsOfTwoPlanesBehindAndOneRow) {
         }
       }
       EXPECT_TRUE(test::same_bytes(written(slab, count), written(slab, poisoned)));
+    }
+  }
+}
+
+// As every format that numbers all vertices needs it.
+TEST(MakeRoom, RefusesMoreVerticesThanHave32Bits) {
+  SurfaceCount count;
+  count.layer_vertices = {0, std::uint64_t{1} << 31, std::uint64_t{1} << 32};
+  count.layer_triangles = {0, 1, 2};
+  Mesh mesh;
+  EXPECT_EQ(test::code_thrown_by([&] { make_room(count, {}, false, mesh); }), ErrorCode::kTooLarge);
+  EXPECT_EQ(mesh.positions.capacity_bytes(), 0U);
+}
+
+TEST(SurfaceSize, TellsTheLargestRunOfLayers) {
+  SurfaceCount count;
+  count.layer_triangles.resize(51);
+  for (std::uint64_t k = 0; k < 50; ++k) {
+    count.layer_vertices.push_back(count.layer_vertices.back() + k * k % 17);
+  }
+  const SurfaceSize size = size_of(count);
+  for (std::size_t layers = 0; layers <= 60; ++layers) {
+    std::uint64_t most = 0;
+    for (std::size_t k = 0; k < 50; ++k) {
+      const std::size_t end = std::min<std::size_t>(50, k + layers);
+      most = std::max(most, count.layer_vertices[end] - count.layer_vertices[k]);
+    }
+    if (layers <= size.largest_runs.size()) {
+      EXPECT_EQ(size.most_vertices(layers), most);
+    } else {
+      EXPECT_GE(size.most_vertices(layers), most);
+      EXPECT_LE(size.most_vertices(layers), size.vertices);
     }
   }
 }
