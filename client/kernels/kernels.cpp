@@ -92,12 +92,11 @@ struct LabelArrays {
 
   LabelArrays(const mesh::SeparatingSurface& walls, const std::vector<LabelSummary>& summaries) {
     reserve(summaries);
-    const mesh::LabelTriangles sides(walls);
-    mesh::Mesh own;
+    const auto surfaces = label_surfaces(walls, {});
     std::size_t vertex = 0;
     std::size_t triangle = 0;
     for (std::size_t n = 0; n < summaries.size(); ++n) {
-      extract_label(walls, sides, n + 1, own);
+      const mesh::Mesh& own = surfaces[n].mesh;
       const auto first = static_cast<std::uint32_t>(vertex);
       const auto corners = [first](const mesh::Triangle& each) {
         return mesh::Triangle{first + each[0], first + each[1], first + each[2]};

@@ -44,8 +44,8 @@ struct Provenance {
 // A surface of all labels.
 struct LabelledSurface {
   const mesh::SeparatingSurface& walls;
-  const mesh::LabelTriangles& triangles;
-  std::span<const LabelSummary> labels;  // in the order of the walls' own
+  std::span<const mesh::LabelSurface> surfaces;  // of each label, in the order of the walls' own
+  std::span<const LabelSummary> labels;          // in the same order
   // The walls as extracted; for files with distances.
   const mesh::TriangleGrid* extracted = nullptr;
 };

@@ -8,25 +8,11 @@
 
 namespace isomesh::codec {
 
-FaceRun::FaceRun(const LabelledSurface& surface, std::size_t number)
-    : mesh_(surface.walls.mesh),
-      surface_(&surface),
-      own_(surface.triangles.of(number)),
-      number_(number),
-      label_(surface.labels[number - 1].label) {}
-
-mesh::Triangle FaceRun::outward(std::uint32_t wall) const {
-  const mesh::Triangle& triangle = mesh_.triangles[wall];
-  const mesh::SeparatingSurface& walls = surface_->walls;
-  const bool is_inside_out = walls.parts.belongs(walls.sides[wall].front, number_);
-  return is_inside_out ? mesh::Triangle{triangle[0], triangle[2], triangle[1]} : triangle;
-}
-
 std::vector<FaceRun> faces_of(const FileContent& content) {
   if (content.labels == nullptr) return {FaceRun(content.mesh)};
   std::vector<FaceRun> runs;
-  for (std::size_t number = 1; number <= content.labels->labels.size(); ++number) {
-    runs.emplace_back(*content.labels, number);
+  for (std::size_t n = 0; n < content.labels->labels.size(); ++n) {
+    runs.emplace_back(content.labels->surfaces[n], content.labels->labels[n].label);
   }
   return runs;
 }

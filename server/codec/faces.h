@@ -16,23 +16,21 @@ namespace isomesh::codec {
 class FaceRun {
  public:
   explicit FaceRun(const mesh::Mesh& mesh) : mesh_(mesh) {}
-  // `number` counts the labels from 1.
-  FaceRun(const LabelledSurface& surface, std::size_t number);
+  FaceRun(const mesh::LabelSurface& surface, std::int64_t label)
+      : mesh_(surface.mesh), walls_(surface.vertices.span()), label_(label) {}
 
-  std::size_t count() const { return surface_ == nullptr ? mesh_.triangles.size() : own_.size(); }
+  std::size_t count() const { return mesh_.triangles.size(); }
   std::int64_t label() const { return label_; }
 
   mesh::Triangle at(std::size_t index) const {
-    return surface_ == nullptr ? mesh_.triangles[index] : outward(own_[index]);
+    const auto& [a, b, c] = mesh_.triangles[index];
+    if (walls_.empty()) return {a, b, c};
+    return {walls_[a], walls_[b], walls_[c]};
   }
 
  private:
-  mesh::Triangle outward(std::uint32_t wall) const;
-
   const mesh::Mesh& mesh_;
-  const LabelledSurface* surface_ = nullptr;
-  std::span<const std::uint32_t> own_;
-  std::size_t number_ = 0;
+  std::span<const std::uint32_t> walls_;  // the number of each vertex there
   std::int64_t label_ = 0;
 };
 

@@ -42,16 +42,16 @@ struct Distances {
   float most = 0;
 };
 
-GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& distances,
-                      const Grid& grid, const MeshParameters& parameters,
-                      const mesh::Context& context) {
+// `shading`: normals that are not the mesh's own; empty if it has no others.
+GlbLevel encode_level(double share, const mesh::Mesh& mesh, mesh::Buffer<mesh::Vec3> shading,
+                      const Distances& distances, const Grid& grid,
+                      const MeshParameters& parameters, const mesh::Context& context) {
   GlbLevel level = {.share = share};
   if (mesh.triangles.size() == 0) return level;
   const mesh::Context quiet = {context.stop, nullptr};
   // Computed on the whole mesh, so both sides of a seam have the same.
-  mesh::Buffer<mesh::Vec3> normals;
-  if (parameters.normals) vertex_normals(mesh, quiet, normals);
-  const VertexData data = {std::as_const(normals).span(), distances.values.span(), distances.most};
+  if (parameters.normals && shading.size() == 0) vertex_normals(mesh, quiet, shading);
+  const VertexData data = {std::as_const(shading).span(), distances.values.span(), distances.most};
   const std::vector<Block> blocks = parameters.merge
                                         ? std::vector<Block>{{{0, mesh.triangles.size()}}}
                                         : cut_blocks(mesh, kTrianglesPerBlock);
@@ -125,49 +125,44 @@ mesh::Context writing(const mesh::Context& context, const MeshParameters& parame
                               : mesh::Context{context.stop, nullptr};
 }
 
-Distances of_label(const Distances& of_walls, const LabelledSurface& surface, std::size_t number) {
-  const auto vertices = vertices_of_label(surface.walls, surface.triangles, number);
-  Distances own;
-  own.most = of_walls.most;
-  own.values.resize_for_overwrite(vertices.size());
-  std::ranges::transform(vertices, own.values.begin(),
-                         [&](std::uint32_t v) { return of_walls.values[v]; });
-  return own;
-}
-
-// The own surface of a label, with normals and distances as the parameters ask.
-struct OwnSurface {
-  OwnSurface(const LabelledSurface& surface, std::size_t number, const Distances& of_walls,
-             const MeshParameters& parameters, const mesh::Context& context) {
-    extract_label(surface.walls, surface.triangles, number, mesh);
-    if (parameters.normals) shade_label(surface.walls, surface.triangles, number, context, mesh);
-    if (parameters.distances) distances = of_label(of_walls, surface, number);
-  }
-
-  mesh::Mesh mesh;
-  Distances distances;
-};
-
 // The walls of one level.
 struct WallLevel {
   LabelledSurface surface;
   Distances distances;  // computed on the walls, so touching labels have the same
+
+  // Those of the own surface of a label, by its place among the labels.
+  Distances distances_of(std::size_t n) const {
+    Distances own;
+    own.most = distances.most;
+    if (distances.values.size() == 0) return own;
+    const mesh::Buffer<std::uint32_t>& vertices = surface.surfaces[n].vertices;
+    own.values.resize_for_overwrite(vertices.size());
+    std::ranges::transform(vertices, own.values.begin(),
+                           [&](std::uint32_t v) { return distances.values[v]; });
+    return own;
+  }
+
+  mesh::Buffer<mesh::Vec3> normals_of(std::size_t n, const MeshParameters& parameters,
+                                      const mesh::Context& context) const {
+    if (!parameters.normals) return {};
+    return shading_of(surface.surfaces[n], surface.walls, context);
+  }
 };
 
 // The walls and `parameters` must outlive the level.
-GlbLevel plain_label(const WallLevel& walls, std::size_t number, double share,
+GlbLevel plain_label(const WallLevel& walls, std::size_t n, double share,
                      const MeshParameters& parameters, const mesh::Context& context) {
-  const mesh::OneThread alone;
-  mesh::Mesh mesh;
-  extract_label(walls.surface.walls, walls.surface.triangles, number, mesh);
+  const mesh::Mesh& mesh = walls.surface.surfaces[n].mesh;
   GlbLevel level = plain_level(share, mesh, parameters);
-  const LabelSummary& label = walls.surface.labels[number - 1];
+  const LabelSummary& label = walls.surface.labels[n];
+  const mesh::OneThread alone;
   // The job has measured the labels of the finest level.
   level.is_solid = share == 1 ? label.closed && label.manifold && label.oriented
                               : is_solid(measure_topology(mesh, context));
-  level.put_others = [&walls, number, &parameters, context](const Sink& sink) {
-    const OwnSurface own(walls.surface, number, walls.distances, parameters, context);
-    put_plain(own.mesh, parameters, own.distances.values.span(), context, sink);
+  level.put_others = [&walls, &mesh, n, &parameters, context](const Sink& sink) {
+    const mesh::Buffer<mesh::Vec3> normals = walls.normals_of(n, parameters, context);
+    const Distances distances = walls.distances_of(n);
+    put_plain(mesh, parameters, {normals.span(), distances.values.span()}, context, sink);
   };
   return level;
 }
@@ -179,18 +174,20 @@ void add_levels(const WallLevel& walls, double share, const Grid& grid,
   const mesh::Context quiet = {context.stop, nullptr};
   mesh::parallel_for(context, parts.size(), [&](std::size_t n) {
     if (is_plain(parameters)) {
-      return parts[n].add_level(plain_label(walls, n + 1, share, parameters, quiet));
+      return parts[n].add_level(plain_label(walls, n, share, parameters, quiet));
     }
-    const OwnSurface own(walls.surface, n + 1, walls.distances, parameters, quiet);
-    parts[n].add_level(encode_level(share, own.mesh, own.distances, grid, parameters, quiet));
+    parts[n].add_level(encode_level(share, walls.surface.surfaces[n].mesh,
+                                    walls.normals_of(n, parameters, quiet), walls.distances_of(n),
+                                    grid, parameters, quiet));
   });
 }
 
 // A coarser level, which may live no longer than its walls.
 struct CoarseLevel {
-  explicit CoarseLevel(const mesh::SeparatingSurface& walls) : triangles(walls) {}
+  CoarseLevel(const mesh::SeparatingSurface& walls, const mesh::Context& context)
+      : surfaces(label_surfaces(walls, context)) {}
 
-  mesh::LabelTriangles triangles;
+  std::vector<mesh::LabelSurface> surfaces;
   std::optional<WallLevel> level = {};
 };
 
@@ -217,8 +214,8 @@ void encode_labels(const LabelledSurface& surface, const Provenance& provenance,
     const LevelProgress progress(context, parameters, n + 1);
     coarsen(count_of(shares[n], surface.walls.mesh), progress.simplify, coarse);
     const auto& own = is_plain(parameters) ? walls.emplace_back(copy_of(coarse)) : coarse;
-    CoarseLevel& level = kept.emplace_back(own);
-    level.level.emplace(level_of({own, level.triangles, surface.labels, surface.extracted}));
+    CoarseLevel& level = kept.emplace_back(own, quiet);
+    level.level.emplace(level_of({own, level.surfaces, surface.labels, surface.extracted}));
     add_levels(*level.level, shares[n], grid, parameters, progress.encode, parts);
     if (!is_plain(parameters)) kept.clear();
   }
@@ -239,7 +236,7 @@ std::optional<mesh::Topology> encode_surface(const FileContent& content,
       return Distances(of, parameters, content.extracted, quiet);
     };
     if (!is_plain(parameters)) {
-      return encode_level(share, level, distances_of(level), grid, parameters, progress);
+      return encode_level(share, level, {}, distances_of(level), grid, parameters, progress);
     }
     GlbLevel plain = plain_level(share, level, parameters);
     const mesh::Topology found = measure_topology(level, quiet);
@@ -247,7 +244,8 @@ std::optional<mesh::Topology> encode_surface(const FileContent& content,
     if (!topology) topology = found;
     if (progress.progress) progress.progress(1);
     plain.put_others = [&parameters, &level, distances_of, quiet](const Sink& to) {
-      put_plain(level, parameters, distances_of(level).values.span(), quiet, to);
+      const Distances distances = distances_of(level);
+      put_plain(level, parameters, {{}, distances.values.span()}, quiet, to);
     };
     return plain;
   };

@@ -114,12 +114,11 @@ std::vector<LabelFiles> encode_labels_zip(const LabelledSurface& surface,
   for (std::size_t begin = 0, end = 0; begin < labels; begin = end) {
     for (std::size_t triangles = 0;
          end < labels && end - begin < kLabelsAtOnce && triangles < kTrianglesAtOnce; ++end) {
-      triangles += surface.triangles.of(end + 1).size();
+      triangles += surface.surfaces[end].triangles.size();
     }
     std::vector<std::vector<Encoded>> encoded(end - begin);
     mesh::parallel_for(quiet, encoded.size(), [&](std::size_t task) {
-      mesh::Mesh mesh;
-      extract_label(surface.walls, surface.triangles, begin + task + 1, mesh);
+      const mesh::Mesh& mesh = surface.surfaces[begin + task].mesh;
       for (const MeshFormat format : formats) {
         encoded[task].push_back(encode_one(mesh, format, grid, provenance, quiet));
       }

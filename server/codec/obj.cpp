@@ -70,11 +70,10 @@ void encode_obj_labels(const LabelledSurface& surface, const FileContent& conten
   for (const LabelSummary& label : surface.labels) records += label.vertices;
   ObjWriter writer(content, context, sink, records);
   ObjGroups groups;
-  mesh::Mesh mesh;
-  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
-    const std::string group = groups.of(surface.labels[n - 1]);
-    if (surface.triangles.of(n).empty()) continue;
-    extract_label(surface.walls, surface.triangles, n, mesh);
+  for (std::size_t n = 0; n < surface.labels.size(); ++n) {
+    const std::string group = groups.of(surface.labels[n]);
+    const mesh::Mesh& mesh = surface.surfaces[n].mesh;
+    if (mesh.triangles.size() == 0) continue;
     put_text(sink, "o " + group + '\n');
     writer.add(mesh, "g " + group + "\nusemtl " + group + '\n');
   }

@@ -54,16 +54,16 @@ ArrayChunk describe_plain(std::size_t vertices, std::size_t triangles,
   return chunk;
 }
 
-void put_plain(const mesh::Mesh& mesh, const MeshParameters& parameters,
-               std::span<const float> distances, const mesh::Context& context, const Sink& sink) {
+void put_plain(const mesh::Mesh& mesh, const MeshParameters& parameters, const VertexData& data,
+               const mesh::Context& context, const Sink& sink) {
   const Writer writer(context, sink);
   writer.put(mesh.positions.span());
   if (parameters.normals) {
     mesh::Buffer<mesh::Vec3> normals;
-    if (mesh.normals.empty()) vertex_normals(mesh, {context.stop, nullptr}, normals);
-    writer.put(mesh.normals.empty() ? std::as_const(normals).span() : std::span(mesh.normals));
+    if (data.normals.empty()) vertex_normals(mesh, {context.stop, nullptr}, normals);
+    writer.put(data.normals.empty() ? std::as_const(normals).span() : data.normals);
   }
-  writer.put(distances);
+  writer.put(data.distances);
   writer.put(mesh.triangles.span());
 }
 

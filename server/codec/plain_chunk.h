@@ -6,6 +6,7 @@
 #include <span>
 
 #include "server/codec/array_chunk.h"
+#include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
 #include "server/mesh/mesh.h"
 
@@ -16,9 +17,9 @@ namespace isomesh::codec {
 ArrayChunk describe_plain(std::size_t vertices, std::size_t triangles,
                           const MeshParameters& parameters);
 
-// Writes those arrays. `distances` has one for each vertex, or none. Holds the normals in memory if
-// the mesh has none of its own. Throws Error kCancelled, which is checked between pieces.
-void put_plain(const mesh::Mesh& mesh, const MeshParameters& parameters,
-               std::span<const float> distances, const mesh::Context& context, const Sink& sink);
+// Writes those arrays, with distances if `data` has them, which are one for each vertex. Holds the
+// normals in memory if `data` has none. Throws Error kCancelled, which is checked between pieces.
+void put_plain(const mesh::Mesh& mesh, const MeshParameters& parameters, const VertexData& data,
+               const mesh::Context& context, const Sink& sink);
 
 }  // namespace isomesh::codec

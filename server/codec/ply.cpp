@@ -110,18 +110,17 @@ void encode_ply_labels(const LabelledSurface& surface, const FileContent& conten
   BlockWriter writer(context, sink, vertices + faces);
   for (std::size_t n = 0; n < surface.labels.size(); ++n) {
     const LabelVertex vertex = {color_in_bytes(surface.labels[n]), values.of(n)};
-    const auto chosen = vertices_of_label(surface.walls, surface.triangles, n + 1);
-    if (chosen.size() != surface.labels[n].vertices) {
+    const auto& positions = surface.surfaces[n].mesh.positions;
+    if (positions.size() != surface.labels[n].vertices) {
       throw Error(ErrorCode::kInternal, "a label's surface has another number of vertices");
     }
-    writer.write(chosen.size(), LabelVertex::kBytes, [&](std::size_t v, std::byte* out) {
-      return vertex.write(in_space(content.mesh.positions[chosen[v]], content.space), out);
+    writer.write(positions.size(), LabelVertex::kBytes, [&](std::size_t v, std::byte* out) {
+      return vertex.write(in_space(positions[v], content.space), out);
     });
   }
   std::uint32_t first = 0;
-  mesh::Mesh mesh;
-  for (std::size_t n = 0; n < surface.labels.size(); ++n) {
-    extract_label(surface.walls, surface.triangles, n + 1, mesh);
+  for (const mesh::LabelSurface& own : surface.surfaces) {
+    const mesh::Mesh& mesh = own.mesh;
     writer.write(mesh.triangles.size(), kPlyFaceBytes, [&](std::size_t t, std::byte* out) {
       const auto& [a, b, c] = mesh.triangles[t];
       return write_ply_face({first + a, first + b, first + c}, out);

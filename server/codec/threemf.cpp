@@ -203,13 +203,13 @@ class Package {
 
 // One label's title, or how many have triangles.
 std::string title_of_all(std::span<const LabelSummary> labels,
-                         const mesh::LabelTriangles& triangles) {
+                         std::span<const mesh::LabelSurface> surfaces) {
   std::size_t count = 0;
   const LabelSummary* last = nullptr;
-  for (std::size_t n = 1; n <= labels.size(); ++n) {
-    if (triangles.of(n).empty()) continue;
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    if (surfaces[n].triangles.size() == 0) continue;
     ++count;
-    last = &labels[n - 1];
+    last = &labels[n];
   }
   if (last == nullptr) return "no label";
   return count == 1 ? title_of(*last) : std::to_string(count) + " labels";
@@ -221,14 +221,13 @@ void encode_labels(const LabelledSurface& surface, const FileContent& content,
   const std::size_t labels = surface.labels.size();
   // Every wall belongs to one or two labels.
   const std::uint64_t walls = surface.walls.mesh.triangles.size();
-  const std::string title = title_of_all(surface.labels, surface.triangles);
+  const std::string title = title_of_all(surface.labels, surface.surfaces);
   Package package(sink, {2 * walls, 2 * 3 * walls}, content,
                   {title, "The surface of " + title + '.' + about_coordinates(content)});
-  mesh::Mesh mesh;
   for (std::size_t n = 1; n <= labels; ++n) {
     const LabelSummary& label = surface.labels[n - 1];
-    if (!surface.triangles.of(n).empty()) {
-      extract_label(surface.walls, surface.triangles, n, mesh);
+    const mesh::Mesh& mesh = surface.surfaces[n - 1].mesh;
+    if (mesh.triangles.size() > 0) {
       package.add_object({.name = title_of(label),
                           .part_number = std::to_string(label.label),
                           .color = color_of(label)},

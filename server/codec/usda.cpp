@@ -95,10 +95,11 @@ class Stage {
           "    upAxis = \"Y\"\n)\n\ndef Xform \"isomesh\" (\n    kind = \"component\"\n)\n{\n");
   }
 
-  void add(const MeshPrim& object, const mesh::Mesh& mesh, const mesh::Context& context) {
+  // `normals`: empty if they are not others than the mesh's.
+  void add(const MeshPrim& object, const mesh::Mesh& mesh, mesh::Buffer<mesh::Vec3> normals,
+           const mesh::Context& context) {
     check_signed_indices(mesh.positions.size(), mesh.triangles.size(), format_);
-    mesh::Buffer<mesh::Vec3> normals;
-    if (has_normals_) vertex_normals(mesh, {context.stop, nullptr}, normals);
+    if (has_normals_ && normals.size() == 0) vertex_normals(mesh, {context.stop, nullptr}, normals);
     std::array<float, 3> linear;
     std::ranges::transform(object.color, linear.begin(),
                            [](double channel) { return static_cast<float>(linear_of(channel)); });
@@ -191,16 +192,17 @@ void add_labels(const LabelledSurface& surface, bool has_normals, const mesh::Co
   const mesh::Context quiet = {context.stop, nullptr};
   const std::size_t labels = surface.labels.size();
   std::set<std::string> prims;
-  mesh::Mesh mesh;
   for (std::size_t n = 1; n <= labels; ++n) {
     const LabelSummary& label = surface.labels[n - 1];
-    if (!surface.triangles.of(n).empty()) {
-      extract_label(surface.walls, surface.triangles, n, mesh);
-      if (has_normals) shade_label(surface.walls, surface.triangles, n, quiet, mesh);
+    const mesh::LabelSurface& own = surface.surfaces[n - 1];
+    if (own.triangles.size() > 0) {
+      mesh::Buffer<mesh::Vec3> normals;
+      if (has_normals) normals = shading_of(own, surface.walls, quiet);
       const std::string metadata =
           "        customData = {\n            int64 label = " + std::to_string(label.label) +
           "\n        }\n        displayName = " + usd_string(title_of(label)) + '\n';
-      stage.add({prim_of(label, prims), metadata, color_of(label)}, mesh, quiet);
+      stage.add({prim_of(label, prims), metadata, color_of(label)}, own.mesh, std::move(normals),
+                quiet);
     }
     if (context.progress) context.progress(static_cast<double>(n) / static_cast<double>(labels));
   }
@@ -216,7 +218,7 @@ std::optional<mesh::Topology> encode_usda(const FileContent& content, const mesh
     add_labels(*content.labels, content.provenance.parameters.normals, context, stage);
   } else if (content.mesh.triangles.size() > 0) {
     constexpr std::array<double, 3> kNeutral = {0.863, 0.839, 0.784};
-    stage.add({"surface", "", kNeutral}, content.mesh, context);
+    stage.add({"surface", "", kNeutral}, content.mesh, {}, context);
   }
   stage.finish();
   return std::nullopt;

@@ -97,7 +97,7 @@ void LabelStages::smooth(const mesh::SmoothOptions& options) {
 }
 
 std::vector<mesh::LabelMeasure> LabelStages::measure() const {
-  return mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {});
+  return mesh::measure_labels(surface_, label_surfaces(surface_, {}), {});
 }
 
 JobFigures LabelStages::run_job(bool certify) {

@@ -146,9 +146,9 @@ CountedSurface count_labels(const SampleArray& samples, const MeshParameters& pa
       separate_options(mesh::chosen_labels(count_values(samples, context), parameters), parameters);
   return with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
-    CountedSurface counted = {.size = size_of(count_walls(lattice, options, context)),
-                              .labels = {}};
-    const auto triangles = count_label_triangles(lattice, options, context);
+    const mesh::SurfaceCount count = count_walls(lattice, options, context);
+    CountedSurface counted = {.size = size_of(count), .labels = {}};
+    const auto triangles = count_label_triangles(lattice, options, count, context);
     for (std::size_t n = 0; n < options.labels.size(); ++n) {
       counted.labels.push_back({options.labels[n], triangles[n + 1]});
     }
@@ -181,8 +181,8 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};
 
   progress.enter(Stage::kEncode);
-  const mesh::LabelTriangles triangles(walls);
-  const auto measures = measure_labels(walls, triangles, progress.quiet());
+  const auto surfaces = label_surfaces(walls, progress.quiet());
+  const auto measures = measure_labels(walls, surfaces, progress.quiet());
   set_quality(measures, summary);
   made.walls = measure_walls(walls, progress.quiet());
   summary.walls_count = made.walls.size();
@@ -192,7 +192,7 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   const KeptFiles files(written, sinks);
   {
     const auto grid = grid_for_distances(parameters, extracted, progress);
-    encode_all({walls, triangles, summary.labels, grid ? &*grid : nullptr},
+    encode_all({walls, surfaces, summary.labels, grid ? &*grid : nullptr},
                provenance_of(samples, written), files.sinks(), progress, summary);
   }
   certify_stage(written, extracted, files, progress, walls.mesh, summary);

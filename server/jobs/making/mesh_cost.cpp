@@ -8,7 +8,7 @@
 #include "server/codec/formats.h"
 #include "server/codec/walked_file.h"
 #include "server/jobs/making/error_budget.h"
-#include "server/mesh/labels/label_parts.h"
+#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/smooth/untangle.h"
@@ -50,11 +50,11 @@ std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t sampl
 }
 
 // The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,
-// the lists of each label's triangles and, at worst, all labels' own surfaces at once. A triangle
-// is in two of them at most.
+// and all labels' own surfaces.
 std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
-  return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
-         surface.vertices * sizeof(mesh::VertexOwner) + 2 * mesh_bytes(surface);
+  return surface.triangles * sizeof(mesh::WallSides) +
+         surface.vertices * sizeof(mesh::VertexOwner) +
+         mesh::LabelSurface::bytes(surface.vertices, surface.triangles);
 }
 
 // The memory of untangling, simplifying and certifying, one after the other, beside the rest: the

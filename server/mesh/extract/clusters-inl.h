@@ -220,8 +220,6 @@ class ClusterWalk {
     }
   }
 
-  Rule& rule() { return rule_; }
-
  private:
   using Edges = EdgeWords<Rule::kPlaces>;
 

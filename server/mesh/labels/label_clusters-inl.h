@@ -55,9 +55,6 @@ class LabelClusters {
         points_(star_points(separation.scheme)),
         field_(separation, first) {}
 
-  // Takes the triangles that vanish from the places of the labels' numbers.
-  void tally_into(std::span<std::uint64_t> triangles) { tally_ = triangles; }
-
   void reach(std::uint32_t z) { field_.reach(z); }
   void open(std::uint32_t /*z*/) {}
 
@@ -110,14 +107,8 @@ class LabelClusters {
   ClusterLoss loss(const GridSample& at, Joined kept, const ClusterFacts& facts,
                    ClusterLayer& layer) {
     const Directions joined = kept.directions();
-    const bool is_junction = kept.is_junction();
-    if (!is_junction && tally_.empty()) return loss_of_components(links_, joined, facts);
+    if (!kept.is_junction()) return loss_of_components(links_, joined, facts);
     look_around(at);
-    if (!is_junction) {
-      const ClusterLoss loss = loss_of_components(links_, joined, facts);
-      take(label(at), around_[first_of(joined)], loss.triangles + loss.triangles_below);
-      return loss;
-    }
     JoinedPoints points;
     ClusterLoss loss = {.vertices = ~std::uint64_t{0}};  // one vertex remains
     const StarPoints& all = points_[parity(at)];
@@ -135,10 +126,10 @@ class LabelClusters {
     });
     layer.points.push_back(points);
     for (const Directions corners : links_.above(parity(at))) {
-      loss.triangles += lose_triangles(label(at), corners & joined);
+      loss.triangles += lost_triangles(corners & joined);
     }
     for (const Directions corners : links_.below(parity(at))) {
-      loss.triangles_below += lose_triangles(label(at), corners & joined);
+      loss.triangles_below += lost_triangles(corners & joined);
     }
     return loss;
   }
@@ -262,48 +253,24 @@ class LabelClusters {
   }
 
   // How many triangles vanish in a tetrahedron some of whose corners the sample joins, those in
-  // `joined`: all with two vertices that are joined. Takes them from the tally.
-  std::uint64_t lose_triangles(PartNumber own, Directions joined) {
+  // `joined`: all with two vertices that are joined. By the cases of wall_cases.h, two joined
+  // corners lose one beside each label. Three lose all but one or two, if all vertices are joined
+  // but those between other labels.
+  std::uint64_t lost_triangles(Directions joined) const {
     const int size = std::popcount(joined);
     if (size < 2) return 0;
-    std::array<PartNumber, 3> labels = {};
-    std::array<std::uint64_t, 3> corners = {};
-    std::size_t count = 0;
-    for (Directions rest = joined; rest != 0; rest &= rest - 1) {
-      const PartNumber next = around_[first_of(rest)];
-      const std::size_t n = static_cast<std::size_t>(
-          std::find(labels.data(), labels.data() + count, next) - labels.data());
-      labels[n] = next;
-      ++corners[n];
-      count = std::max(count, n + 1);
+    std::uint64_t labels = 0;
+    while (joined != 0) {
+      joined &= ~with_label(joined, around_[first_of(joined)]);
+      ++labels;
     }
-    // The cases of wall_cases.h: two joined corners lose one triangle beside each label. Three lose
-    // all but one or two, if all vertices are joined but those between other labels.
-    std::uint64_t lost = 0;
-    for (std::size_t n = 0; n < count; ++n) {
-      const bool has_two = size == 3 && (count == 3 || (count == 2 && corners[n] == 2));
-      const std::uint64_t of_own = has_two ? 2 : 1;
-      take(own, labels[n], of_own);
-      lost += of_own;
-      for (std::size_t m = n + 1; size == 3 && m < count; ++m) {
-        take(labels[n], labels[m], 1);
-        ++lost;
-      }
-    }
-    return lost;
-  }
-
-  void take(PartNumber a, PartNumber b, std::uint64_t triangles) {
-    if (tally_.empty()) return;
-    separation_.parts.visit_labels(a, b,
-                                   [&](std::size_t label, bool) { tally_[label] -= triangles; });
+    return size == 2 ? labels : labels * labels;
   }
 
   const Separation& separation_;
   const Links& links_;
   const std::array<StarPoints, 2>& points_;
   LabelField field_;
-  std::span<std::uint64_t> tally_;
   bool has_row_ = false;
   std::uint32_t row_y_ = 0;
   std::uint32_t row_z_ = 0;

@@ -36,9 +36,6 @@ struct Separation : Marching {
 
 void count_slab(const Separation& separation, const Slab& slab, SurfaceCount& count);
 
-// Adds to the place of each label's number how many of the slab's triangles have it on either side.
-void tally_slab(const Separation& separation, const Slab& slab, std::span<std::uint64_t> triangles);
-
 void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,
                 SeparatingSurface& surface);
 

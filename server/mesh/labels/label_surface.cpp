@@ -17,52 +17,36 @@
 namespace isomesh::mesh {
 namespace {
 
-// The vertices that some triangles name, renumbered from 0 in the same order. A thread may have one
-// at a time.
+// The vertices that some triangles name, renumbered from 0 in the same order.
 class VertexChoice {
  public:
-  VertexChoice(std::span<const Triangle> all, std::span<const std::uint32_t> triangles) {
+  explicit VertexChoice(std::span<const Triangle> triangles) {
     std::uint32_t low = std::numeric_limits<std::uint32_t>::max();
     std::uint32_t high = 0;
-    for (const std::uint32_t t : triangles) {
-      for (const std::uint32_t v : all[t]) {
+    for (const Triangle& triangle : triangles) {
+      for (const std::uint32_t v : triangle) {
         low = std::min(low, v);
         high = std::max(high, v);
       }
     }
     if (triangles.empty()) return;
-    first_word_ = low / kWordBits;
-    words_.resize(high / kWordBits - first_word_ + 1);
-    for (const std::uint32_t t : triangles) {
-      for (const std::uint32_t v : all[t]) {
-        words_[v / kWordBits - first_word_].chosen |= std::uint32_t{1} << (v % kWordBits);
-      }
+    first_ = low / kWordBits * kWordBits;
+    words_.resize((high - first_) / kWordBits + 1);
+    for (const Triangle& triangle : triangles) {
+      for (const std::uint32_t v : triangle) word_of(v).chosen |= bit_of(v);
     }
     for (Word& word : words_) {
       word.before = count_;
-      count_ += bits_of(word.chosen);
+      count_ += bits_in(word.chosen);
     }
-    thread_local std::vector<std::uint32_t> numbers;  // keeps its memory
-    numbers.resize(std::max<std::size_t>(numbers.size(), words_.size() * kWordBits));
-    numbers_ = numbers.data();
-    std::uint32_t next = 0;
-    visit([&](std::uint64_t vertex) { numbers_[vertex - first_word_ * kWordBits] = next++; });
   }
 
   std::uint32_t count() const { return count_; }
 
   // The number of a vertex that is chosen.
   std::uint32_t operator[](std::uint32_t vertex) const {
-    return numbers_[vertex - first_word_ * kWordBits];
-  }
-
-  // How many there are before `vertex`, chosen or not.
-  std::uint32_t before(std::uint64_t vertex) const {
-    const std::uint64_t at = vertex / kWordBits;
-    if (at < first_word_) return 0;
-    if (at >= first_word_ + words_.size()) return count_;
-    const Word& word = words_[at - first_word_];
-    return word.before + bits_of(word.chosen & ((std::uint32_t{1} << (vertex % kWordBits)) - 1));
+    const Word& word = words_[(vertex - first_) / kWordBits];
+    return word.before + bits_in(word.chosen & (bit_of(vertex) - 1));
   }
 
   // In their order.
@@ -70,7 +54,8 @@ class VertexChoice {
   void visit(Visit visit) const {
     for (std::size_t w = 0; w < words_.size(); ++w) {
       for (std::uint32_t rest = words_[w].chosen; rest != 0; rest &= rest - 1) {
-        visit((first_word_ + w) * kWordBits + static_cast<unsigned>(std::countr_zero(rest)));
+        visit(first_ + static_cast<std::uint32_t>(w * kWordBits) +
+              static_cast<std::uint32_t>(std::countr_zero(rest)));
       }
     }
   }
@@ -83,132 +68,134 @@ class VertexChoice {
   };
 
   // As std::popcount, which is a call on processors that need not have the instruction.
-  static std::uint32_t bits_of(std::uint32_t set) {
+  static std::uint32_t bits_in(std::uint32_t set) {
     set -= set >> 1 & 0x55555555;
     set = (set & 0x33333333) + (set >> 2 & 0x33333333);
     return ((set + (set >> 4)) & 0x0f0f0f0f) * 0x01010101 >> 24;
   }
+  static std::uint32_t bit_of(std::uint32_t v) { return std::uint32_t{1} << (v % kWordBits); }
 
-  std::uint64_t first_word_ = 0;
+  Word& word_of(std::uint32_t vertex) { return words_[(vertex - first_) / kWordBits]; }
+
+  std::uint32_t first_ = 0;  // the vertex of the first word's first bit
   std::vector<Word> words_;
-  std::uint32_t* numbers_ = nullptr;  // from that of the first word's first vertex on
   std::uint32_t count_ = 0;
 };
 
-void take_vertices(const Mesh& from, const VertexChoice& choice, Mesh& to) {
-  to.positions.resize_for_overwrite(choice.count());
-  to.on_line.clear();
-  to.normals.clear();
-  to.on_border.assign(from.on_border.empty() ? 0 : (choice.count() + kFlagBits - 1) / kFlagBits, 0);
-  std::size_t next = 0;
-  choice.visit([&](std::uint64_t vertex) {
-    to.positions[next] = from.positions[vertex];
-    if (from.is_on_border(vertex)) {
-      to.on_border[next / kFlagBits] |= std::uint64_t{1} << (next % kFlagBits);
-    }
-    ++next;
-  });
-  to.layer_vertices.clear();
-  for (const std::uint64_t first : from.layer_vertices) {
-    to.layer_vertices.push_back(choice.before(first));
+// The numbers of the triangles that have each label on either side.
+void list_triangles(const SeparatingSurface& walls, std::vector<LabelSurface>& labels) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (walls.sides.size() > kMost) {
+    throw Error(ErrorCode::kTooLarge, "the surfaces of the labels have " +
+                                          std::to_string(walls.sides.size()) +
+                                          " triangles; more than " + std::to_string(kMost) +
+                                          " cannot be numbered with 32 bits");
+  }
+  std::vector<std::uint32_t> sizes(labels.size() + 1, 0);
+  for (const auto& [front, back] : walls.sides) {
+    walls.parts.visit_labels(front, back, [&](std::size_t label, bool) { ++sizes[label]; });
+  }
+  std::vector<std::uint32_t*> next(sizes.size());
+  for (std::size_t n = 1; n < sizes.size(); ++n) {
+    next[n] = labels[n - 1].triangles.resize_for_overwrite(sizes[n]);
+  }
+  for (std::uint32_t t = 0; t < walls.sides.size(); ++t) {
+    const auto& [front, back] = walls.sides[t];
+    walls.parts.visit_labels(front, back, [&](std::size_t label, bool) { *next[label]++ = t; });
   }
 }
 
-LabelMeasure measure(const SeparatingSurface& surface, const LabelTriangles& triangles,
-                     std::size_t number, const Context& context) {
-  const OneThread alone;
-  Mesh mesh;
-  extract_label(surface, triangles, number, mesh);
-  return {.label = surface.labels[number - 1],
-          .vertices = mesh.positions.size(),
-          .triangles = mesh.triangles.size(),
-          .topology = measure_topology(mesh, context),
-          .extent = measure_extent(mesh, context)};
+// How many of the chosen ones, ascending, are in front of each layer.
+std::vector<std::uint64_t> layers_of(const Buffer<std::uint32_t>& chosen,
+                                     const std::vector<std::uint64_t>& layers) {
+  std::vector<std::uint64_t> own;
+  for (const std::uint64_t first : layers) {
+    const auto at = std::ranges::lower_bound(chosen, first);
+    own.push_back(static_cast<std::uint64_t>(at - chosen.begin()));
+  }
+  return own;
+}
+
+// Takes the surface of the label of that number, from 1 on, whose triangles are listed.
+void take_surface(const SeparatingSurface& walls, std::size_t number, LabelSurface& label) {
+  const Mesh& from = walls.mesh;
+  Mesh& mesh = label.mesh;
+  mesh.origin = from.origin;
+  mesh.triangles.resize_for_overwrite(label.triangles.size());
+  for (std::size_t t = 0; t < label.triangles.size(); ++t) {
+    const auto& [a, b, c] = from.triangles[label.triangles[t]];
+    const bool is_inside_out = walls.parts.belongs(walls.sides[label.triangles[t]].front, number);
+    mesh.triangles[t] = {a, is_inside_out ? c : b, is_inside_out ? b : c};
+  }
+  const VertexChoice choice(mesh.triangles.span());
+  for (Triangle& triangle : mesh.triangles) {
+    for (std::uint32_t& vertex : triangle) vertex = choice[vertex];
+  }
+  label.vertices.resize_for_overwrite(choice.count());
+  mesh.positions.resize_for_overwrite(choice.count());
+  mesh.on_border.assign(from.on_border.empty() ? 0 : (choice.count() + kFlagBits - 1) / kFlagBits,
+                        0);
+  std::size_t next = 0;
+  choice.visit([&](std::uint32_t vertex) {
+    label.vertices[next] = vertex;
+    mesh.positions[next] = from.positions[vertex];
+    if (from.is_on_border(vertex)) {
+      mesh.on_border[next / kFlagBits] |= std::uint64_t{1} << (next % kFlagBits);
+    }
+    ++next;
+  });
+  mesh.layer_vertices = layers_of(label.vertices, from.layer_vertices);
+  mesh.layer_triangles = layers_of(label.triangles, from.layer_triangles);
 }
 
 }  // namespace
 
-LabelTriangles::LabelTriangles(const SeparatingSurface& surface)
-    : ends_(surface.labels.size() + 1, 0) {
-  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
-  if (surface.sides.size() > kMost) {
-    throw Error(ErrorCode::kTooLarge, "the surfaces of the labels have " +
-                                          std::to_string(surface.sides.size()) +
-                                          " triangles; more than " + std::to_string(kMost) +
-                                          " cannot be numbered with 32 bits");
-  }
-  for (const auto& [front, back] : surface.sides) {
-    surface.parts.visit_labels(front, back, [&](std::size_t label, bool) { ++ends_[label]; });
-  }
-  // While the lists are filled, an end is where its list goes on.
-  std::uint64_t begin = 0;
-  for (std::size_t n = 1; n < ends_.size(); ++n) {
-    const std::uint64_t size = ends_[n];
-    ends_[n] = begin;
-    begin += size;
-  }
-  triangles_.resize_for_overwrite(begin);
-  for (std::uint32_t t = 0; t < surface.sides.size(); ++t) {
-    const auto& [front, back] = surface.sides[t];
-    surface.parts.visit_labels(front, back,
-                               [&](std::size_t label, bool) { triangles_[ends_[label]++] = t; });
-  }
+std::uint64_t LabelSurface::bytes(std::uint64_t vertices, std::uint64_t triangles) {
+  return 2 * (triangles * (sizeof(Triangle) + sizeof(std::uint32_t)) +
+              vertices * (sizeof(Vec3) + sizeof(std::uint32_t)));
 }
 
-void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
-                   std::size_t number, Mesh& mesh) {
-  const Mesh& from = surface.mesh;
-  const std::span<const std::uint32_t> own = triangles.of(number);
-  const VertexChoice choice(from.triangles.span(), own);
-  mesh.origin = from.origin;
-  take_vertices(from, choice, mesh);
-  mesh.triangles.resize_for_overwrite(own.size());
-  for (std::size_t t = 0; t < own.size(); ++t) {
-    const auto& [a, b, c] = from.triangles[own[t]];
-    const bool is_inside_out = surface.parts.belongs(surface.sides[own[t]].front, number);
-    mesh.triangles[t] = {choice[a], choice[is_inside_out ? c : b], choice[is_inside_out ? b : c]};
-  }
-  mesh.layer_triangles.clear();
-  for (const std::uint64_t first : from.layer_triangles) {
-    const auto at = std::ranges::lower_bound(own, first);
-    mesh.layer_triangles.push_back(static_cast<std::uint64_t>(at - own.begin()));
-  }
+std::vector<LabelSurface> label_surfaces(const SeparatingSurface& walls, const Context& context) {
+  std::vector<LabelSurface> labels(walls.labels.size());
+  list_triangles(walls, labels);
+  parallel_for(context, labels.size(),
+               [&](std::size_t n) { take_surface(walls, n + 1, labels[n]); });
+  return labels;
 }
 
-void shade_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
-                 std::size_t number, const Context& context, Mesh& mesh) {
+Buffer<Vec3> shading_of(const LabelSurface& label, const SeparatingSurface& walls,
+                        const Context& context) {
+  const Mesh& mesh = label.mesh;
   Buffer<Vec3> normals;
   vertex_normals(mesh, context, normals);
   std::vector<Vec3> outside(mesh.positions.size(), Vec3{0, 0, 0});
-  const std::span<const std::uint32_t> own = triangles.of(number);
-  for (std::size_t t = 0; t < own.size(); ++t) {
-    if (surface.sides[own[t]].front != 0) continue;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (walls.sides[label.triangles[t]].front != 0) continue;
     const Vec3 normal = area_normal(mesh, mesh.triangles[t]);
     for (const std::uint32_t vertex : mesh.triangles[t]) {
       for (std::size_t axis = 0; axis < 3; ++axis) outside[vertex][axis] += normal[axis];
     }
   }
   for (std::size_t v = 0; v < outside.size(); ++v) {
-    outside[v] = outside[v] == Vec3{0, 0, 0} ? normals[v] : unit(outside[v]);
+    if (outside[v] != Vec3{0, 0, 0}) normals[v] = unit(outside[v]);
   }
-  mesh.normals = std::move(outside);
+  return normals;
 }
 
-std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
-                                             const LabelTriangles& triangles, std::size_t number) {
-  std::vector<std::uint32_t> vertices;
-  const VertexChoice choice(surface.mesh.triangles.span(), triangles.of(number));
-  vertices.reserve(choice.count());
-  choice.visit([&](std::uint64_t v) { vertices.push_back(static_cast<std::uint32_t>(v)); });
-  return vertices;
-}
-
-std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
-                                         const LabelTriangles& triangles, const Context& context) {
-  std::vector<LabelMeasure> measures(surface.labels.size());
+std::vector<LabelMeasure> measure_labels(const SeparatingSurface& walls,
+                                         std::span<const LabelSurface> labels,
+                                         const Context& context) {
+  std::vector<LabelMeasure> measures(labels.size());
   const Context quiet = {context.stop, nullptr};
-  parallel_for(context, measures.size(),
-               [&](std::size_t n) { measures[n] = measure(surface, triangles, n + 1, quiet); });
+  parallel_for(context, labels.size(), [&](std::size_t n) {
+    const OneThread alone;
+    const Mesh& mesh = labels[n].mesh;
+    measures[n] = {.label = walls.labels[n],
+                   .vertices = mesh.positions.size(),
+                   .triangles = mesh.triangles.size(),
+                   .topology = measure_topology(mesh, quiet),
+                   .extent = measure_extent(mesh, quiet)};
+  });
   return measures;
 }
 
@@ -217,11 +204,15 @@ std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Cont
   using Sides = std::pair<PartNumber, PartNumber>;
   std::vector<std::map<Sides, double>> layers(mesh.layers());
   parallel_for(context, layers.size(), [&](std::size_t layer) {
+    WallSides last;
+    double* area = nullptr;  // of those sides: neighbours mostly have the same
     for (std::uint64_t t = mesh.layer_triangles[layer]; t < mesh.layer_triangles[layer + 1]; ++t) {
       const auto at = [&](std::size_t i) { return to_point(mesh.positions[mesh.triangles[t][i]]); };
       const Point normal = normal_of(at(0), at(1), at(2));
       const WallSides& sides = surface.sides[t];
-      layers[layer][{sides.front, sides.back}] += std::sqrt(dot(normal, normal)) / 2;
+      if (sides != last || area == nullptr) area = &layers[layer][{sides.front, sides.back}];
+      last = sides;
+      *area += std::sqrt(dot(normal, normal)) / 2;
     }
   });
   std::map<std::pair<std::size_t, std::size_t>, double> areas;

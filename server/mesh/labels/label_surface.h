@@ -1,4 +1,4 @@
-// One label's own surface, taken out of the walls between all.
+// Each label's own surface, taken out of the walls between all.
 #pragma once
 
 #include <cstdint>
@@ -13,39 +13,29 @@
 
 namespace isomesh::mesh {
 
-// The triangles that have each label on either side. Takes 8 bytes for each triangle and each
-// label. Does not refer to the surface afterwards. Immutable, so safe to read from several threads.
-class LabelTriangles {
- public:
-  // Throws Error kTooLarge when 32 bits cannot number all triangles.
-  explicit LabelTriangles(const SeparatingSurface& surface);
+// The surface of one label: the walls' triangles that have it on either side, turned outward, in
+// their order and their layers. It is an oriented manifold, and closed when the walls are. What two
+// labels share has the same positions in both, to the bit.
+struct LabelSurface {
+  Mesh mesh;
+  Buffer<std::uint32_t> triangles;  // the number that each has in the walls
+  Buffer<std::uint32_t> vertices;   // and each vertex
 
-  // The triangles of label number `number`, from 1 on (see WallSides), in the surface's order.
-  std::span<const std::uint32_t> of(std::size_t number) const {
-    return triangles_.span().subspan(ends_[number - 1], ends_[number] - ends_[number - 1]);
-  }
-
- private:
-  std::vector<std::uint64_t> ends_;  // ends_[n] of label n
-  Buffer<std::uint32_t> triangles_;
+  // An upper estimate of the memory of all labels' surfaces, of walls of that size: a triangle is
+  // in two of them at most, unless labels overlap.
+  static std::uint64_t bytes(std::uint64_t vertices, std::uint64_t triangles);
 };
 
-// The surface of the label of that number, from 1 on, into `mesh`, whose memory is reused: the
-// triangles that have it on either side, turned outward, in their order and their layers. It is an
-// oriented manifold, and closed when the surface is. What two labels share has the same positions
-// in both, to the bit. Thread safe for different meshes.
-void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
-                   std::size_t number, Mesh& mesh);
+// The surfaces of all labels, in the order of SeparatingSurface::labels. They do not refer to the
+// walls. The same for any number of threads. Throws Error kTooLarge when 32 bits cannot number all
+// triangles, and kCancelled.
+std::vector<LabelSurface> label_surfaces(const SeparatingSurface& walls, const Context& context);
 
-// Gives such a surface normals for shading: where it leaves the walls between labels, those of its
-// outside alone. The mean with a wall, which its neighbour hides, would be right for neither, and
-// edges would look dark. Thread safe for different meshes. Throws Error kCancelled.
-void shade_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
-                 std::size_t number, const Context& context, Mesh& mesh);
-
-// The walls' vertices that extract_label takes for that label, in the order of its surface.
-std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
-                                             const LabelTriangles& triangles, std::size_t number);
+// The normals of a label's surface for shading: where it leaves the walls between labels, those of
+// its outside alone. The mean with a wall, which its neighbour hides, would be right for neither,
+// and edges would look dark. Throws Error kCancelled.
+Buffer<Vec3> shading_of(const LabelSurface& label, const SeparatingSurface& walls,
+                        const Context& context);
 
 // The measures of one label's own surface.
 struct LabelMeasure {
@@ -58,10 +48,11 @@ struct LabelMeasure {
   bool is_closed() const { return topology.boundary_edges == 0; }
 };
 
-// Measures each label's surface, in the order of the labels. Each thread holds one label's surface
-// at a time. The result is the same for any number of threads. Throws Error kCancelled.
-std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
-                                         const LabelTriangles& triangles, const Context& context);
+// Measures each label's surface, in the order of the labels. The same for any number of threads.
+// Throws Error kCancelled.
+std::vector<LabelMeasure> measure_labels(const SeparatingSurface& walls,
+                                         std::span<const LabelSurface> labels,
+                                         const Context& context);
 
 // The area where two labels touch.
 struct WallArea {

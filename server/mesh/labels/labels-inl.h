@@ -106,25 +106,9 @@ class LabelRow : public RowShape {
     WordCount count = {.vertices = count_bits(crossed_edges(w, others))};
     LabelCells cells;
     describe(w, others, cells);
-    visit_walls(w, cells, [&](PartNumber, PartNumber, unsigned n) { count.triangles += n; });
-    for (Word rest = cells.several; rest != 0; rest &= rest - 1) {
-      const auto bit = static_cast<unsigned>(std::countr_zero(rest));
-      const std::uint32_t slots = slots_at(w * kWordBits + bit);
-      count.vertices += static_cast<unsigned>(std::popcount(slots >> kFaceSlot));
-    }
-    return count;
-  }
-
-  // Calls visit(label, other label, triangles) for the walls in the cells of word w.
-  template <class Visit>
-  HWY_INLINE void visit_walls(std::size_t w, const LabelCells& cells, Visit visit) const {
     for (Word rest = cells.crossed & ~cells.several; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
-      const std::size_t x = w * kWordBits + bit;
-      const unsigned inside = cells.cases[bit];
-      visit(label(static_cast<unsigned>(std::countr_one(inside)), x),
-            label(static_cast<unsigned>(std::countr_zero(inside)), x),
-            unsigned{splits_[parity_at(x)].cases[inside].triangles});
+      count.triangles += splits_[parity_at(w * kWordBits + bit)].cases[cells.cases[bit]].triangles;
     }
     for (Word rest = cells.crossed & cells.several; rest != 0; rest &= rest - 1) {
       const std::size_t x = w * kWordBits + static_cast<unsigned>(std::countr_zero(rest));
@@ -132,12 +116,15 @@ class LabelRow : public RowShape {
       const unsigned parity = parity_at(x);
       for (std::size_t t = 0; t < splits_[parity].tetrahedra; ++t) {
         const unsigned pattern = pattern_in(labels, splits_[parity].corners[t]);
-        const TetrahedronWalls& walls = walls_[parity].tetrahedra[t][pattern];
-        for (std::size_t i = 0; i < walls.triangles; ++i) {
-          visit(labels[walls.walls[i].front], labels[walls.walls[i].back], 1U);
-        }
+        count.triangles += walls_[parity].tetrahedra[t][pattern].triangles;
       }
     }
+    for (Word rest = cells.several; rest != 0; rest &= rest - 1) {
+      const auto bit = static_cast<unsigned>(std::countr_zero(rest));
+      const std::uint32_t slots = slots_at(w * kWordBits + bit);
+      count.vertices += static_cast<unsigned>(std::popcount(slots >> kFaceSlot));
+    }
+    return count;
   }
 
   PartNumber label(unsigned corner, std::size_t x) const {

@@ -85,13 +85,13 @@ SurfaceCount count_walls(const Lattice<T>& lattice, const SeparateOptions& optio
                          const Context& context);
 
 // How many triangles the surface of each label alone has (label_surface.h), by its place in
-// SeparateOptions::labels from 1 on. Without writing; exact. Takes as many counts for each of some
-// tasks. Thread safe.
-// Throws Error kCancelled.
+// SeparateOptions::labels from 1 on. `count` must come from count_walls with the same lattice and
+// options. Each thread has some layers of the walls at a time. Thread safe. Throws Error
+// kCancelled.
 template <class T>
 std::vector<std::uint64_t> count_label_triangles(const Lattice<T>& lattice,
                                                  const SeparateOptions& options,
-                                                 const Context& context);
+                                                 const SurfaceCount& count, const Context& context);
 
 // Makes the walls in `surface`, whose memory is reused; beside it O(slice) is taken. `count` must
 // come from count_walls with the same lattice and options. The result does not depend on the number

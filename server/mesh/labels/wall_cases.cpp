@@ -1,9 +1,11 @@
 #include "server/mesh/labels/wall_cases.h"
 
+#include <algorithm>
 #include <bit>
 #include <set>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "server/mesh/points.h"
 
@@ -71,12 +73,11 @@ class TetrahedronBuilder {
   TetrahedronBuilder(const Tetrahedron& corners, bool odd, const std::array<Slots, 2>& slots)
       : corners_(corners), odd_(odd), slots_(slots) {}
 
-  TetrahedronWalls build(unsigned pattern) {
+  // `classes`: for each corner the first one with the same label.
+  TetrahedronWalls build(const std::array<unsigned, 4>& classes) {
     walls_ = {};
-    const std::array<unsigned, 4> classes = classes_of(pattern);
     std::array<unsigned, 4> sizes = {};
     for (const unsigned label : classes) ++sizes[label];
-    if (pattern_of(classes) != pattern) return {};  // "the same" does not carry over: no such case
     unsigned labels = 0;
     for (const unsigned size : sizes) labels += size > 0 ? 1 : 0;
     if (labels == 2) add_two(classes);
@@ -192,19 +193,19 @@ class TetrahedronBuilder {
   TetrahedronWalls walls_;
 };
 
-}  // namespace
-
-std::array<unsigned, 4> classes_of(unsigned pattern) {
-  constexpr std::array<std::array<unsigned, 4>, 4> kPairs = {
-      {{0, 0, 1, 2}, {0, 0, 3, 4}, {1, 3, 0, 5}, {2, 4, 5, 0}}};
-  std::array<unsigned, 4> classes = {0, 1, 2, 3};
-  for (unsigned j = 0; j < 4; ++j) {
-    for (unsigned i = j; i-- > 0;) {
-      if ((pattern >> kPairs[i][j] & 1) == 0) classes[j] = i;
+// All ways in which four corners may have labels: for each the first one with the same label.
+std::vector<std::array<unsigned, 4>> all_classes() {
+  std::vector<std::array<unsigned, 4>> all;
+  for (unsigned n = 0; n < 24; ++n) {
+    const std::array<unsigned, 4> classes = {0, n % 2, n / 2 % 3, n / 6};
+    if (std::ranges::all_of(classes, [&](unsigned i) { return classes[i] == i; })) {
+      all.push_back(classes);
     }
   }
-  return classes;
+  return all;
 }
+
+}  // namespace
 
 WallCases make_wall_cases(Scheme scheme, bool odd, bool left_handed) {
   const std::array<Slots, 2> slots = {slots_of(cell_split(scheme, false)),
@@ -222,8 +223,8 @@ WallCases make_wall_cases(Scheme scheme, bool odd, bool left_handed) {
   }
   for (std::size_t t = 0; t < split.tetrahedra; ++t) {
     TetrahedronBuilder builder(split.corners[t], odd, slots);
-    for (unsigned pattern = 0; pattern < kPatterns; ++pattern) {
-      TetrahedronWalls& walls = cases.tetrahedra[t][pattern] = builder.build(pattern);
+    for (const std::array<unsigned, 4>& classes : all_classes()) {
+      TetrahedronWalls& walls = cases.tetrahedra[t][pattern_of(classes)] = builder.build(classes);
       if (!left_handed) continue;
       for (WallTriangle& wall : walls.walls) std::swap(wall.vertices[1], wall.vertices[2]);
     }

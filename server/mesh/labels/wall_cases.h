@@ -62,9 +62,6 @@ constexpr unsigned pattern_of(const std::array<Label, 4>& labels) {
          (b != d ? 16U : 0U) | (c != d ? 32U : 0U);
 }
 
-// For each corner of a tetrahedron the first one with the same label, as the pattern tells it.
-std::array<unsigned, 4> classes_of(unsigned pattern);
-
 // The walls in cells of one way of splitting.
 struct WallCases {
   std::array<Slot, kSlots> slots = {};  // of corner 0

@@ -170,7 +170,7 @@ TEST_F(LabelDistances, AreOfTheWallsAndTheSameInBothLabelsOfOne) {
                 {mesh::consecutive<std::int64_t>(1, kLabels), Scheme::kSix, true});
   const mesh::TriangleGrid grid(before.mesh, {});
   std::string glb;
-  encode_labels({walls_, *triangles_, labels_, &grid}, MeshFormat::kGlb, provenance_, {},
+  encode_labels({walls_, surfaces_, labels_, &grid}, MeshFormat::kGlb, provenance_, {},
                 [&](std::span<const std::byte> piece) {
                   glb.append(reinterpret_cast<const char*>(piece.data()), piece.size());
                 });

@@ -83,12 +83,6 @@ TEST(ExactText, NamesTheSameVertices) {
 
 class ExactLabels : public test::LabelFilesTest {
  protected:
-  mesh::Mesh surface_of(std::size_t number) const {
-    mesh::Mesh mesh;
-    extract_label(walls_, *triangles_, number, mesh);
-    return mesh;
-  }
-
   // Makes lists of triangles comparable: the encoder of labels chooses first corners and triangle
   // order.
   static std::vector<PlacedTriangle> ordered(std::vector<PlacedTriangle> triangles) {

@@ -285,12 +285,6 @@ TEST(PlainGlb, HasTheSizeThatItsRowTells) {
 class PlainGlbOfLabels : public test::LabelFilesTest {
  protected:
   PlainGlbOfLabels() { provenance_.parameters.glb_codec = GlbCodec::kNone; }
-
-  mesh::Mesh surface_of(std::size_t number) const {
-    mesh::Mesh mesh;
-    extract_label(walls_, *triangles_, number, mesh);
-    return mesh;
-  }
 };
 
 TEST_F(PlainGlbOfLabels, HasEachLabelsOwnVerticesAndNormals) {
@@ -299,10 +293,10 @@ TEST_F(PlainGlbOfLabels, HasEachLabelsOwnVerticesAndNormals) {
   ASSERT_EQ(primitives.size(), kLabels);
   std::vector<std::array<Vec3, 3>> all;
   for (std::size_t n = 1; n <= kLabels; ++n) {
-    mesh::Mesh own = surface_of(n);
+    const mesh::Mesh& own = surfaces_[n - 1].mesh;
     expect_same_arrays(primitives[n - 1].mesh, own);
-    shade_label(walls_, *triangles_, n, {}, own);
-    EXPECT_TRUE(std::ranges::equal(primitives[n - 1].normals, own.normals));
+    const auto normals = shading_of(surfaces_[n - 1], walls_, {});
+    EXPECT_TRUE(std::ranges::equal(primitives[n - 1].normals, normals));
     const auto corners = corners_of(own);
     all.insert(all.end(), corners.begin(), corners.end());
   }
@@ -351,7 +345,7 @@ TEST_F(PlainGlbOfLabels, HasDistancesToTheWallsAndTheSameOnAnyNumberOfThreads) {
   const mesh::TriangleGrid grid(walls_.mesh, {});
   const auto make = [&] {
     std::string glb;
-    encode_labels({walls_, *triangles_, labels_, &grid}, MeshFormat::kGlb, provenance_, {},
+    encode_labels({walls_, surfaces_, labels_, &grid}, MeshFormat::kGlb, provenance_, {},
                   [&](std::span<const std::byte> piece) {
                     glb.append(reinterpret_cast<const char*>(piece.data()), piece.size());
                   });

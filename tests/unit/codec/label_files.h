@@ -30,8 +30,8 @@ class LabelFilesTest : public testing::Test {
     mesh::separate_into(walls_, volume,
                         {mesh::consecutive<std::int64_t>(1, kLabels), Scheme::kSix, true});
     smooth({.steps = test::means(4, {0.5})}, {}, walls_.mesh);
-    triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
-    for (const mesh::LabelMeasure& measure : measure_labels(walls_, *triangles_, {})) {
+    surfaces_ = label_surfaces(walls_, {});
+    for (const mesh::LabelMeasure& measure : measure_labels(walls_, surfaces_, {})) {
       const auto label = static_cast<std::int64_t>(labels_.size() + 1);
       labels_.push_back({.label = label,
                          .voxels = 10 * static_cast<std::uint64_t>(label),
@@ -49,7 +49,11 @@ class LabelFilesTest : public testing::Test {
     provenance_.parameters = label_parameters({});
   }
 
-  codec::LabelledSurface surface() const { return {walls_, *triangles_, labels_}; }
+  codec::LabelledSurface surface() const { return {walls_, surfaces_, labels_}; }
+
+  mesh::Mesh surface_of(std::size_t number) const {
+    return std::move(label_surfaces(walls_, {})[number - 1].mesh);
+  }
 
   std::string encoded(MeshFormat format) const {
     std::string bytes;
@@ -111,7 +115,7 @@ class LabelFilesTest : public testing::Test {
   }
 
   mesh::SeparatingSurface walls_;
-  std::unique_ptr<mesh::LabelTriangles> triangles_;
+  std::vector<mesh::LabelSurface> surfaces_;
   std::vector<LabelSummary> labels_;
   codec::Provenance provenance_;
 };

@@ -227,7 +227,7 @@ TEST_F(LabelFilesTest, GlbHasNormalsWhereTheyAreAskedFor) {
 TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
   const auto empty = test::constant<std::uint8_t>(3, {4, 4, 4});
   mesh::separate_into(walls_, empty, {{3}, Scheme::kSix, false});
-  triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
+  surfaces_ = label_surfaces(walls_, {});
   labels_ = {{.label = 3}};
   const std::string glb = encoded(MeshFormat::kGlb);
   EXPECT_NE(glb.find("label 3"), std::string::npos);
@@ -372,7 +372,7 @@ TEST_F(LabelFilesTest, ThreeMfHasAnObjectWithNameColourAndValueForEachLabel) {
 TEST_F(LabelFilesTest, ThreeMfOfOneLabelIsThatObject) {
   const auto volume = mesh::label_cells(1, {12, 12, 12}, 4, 401);
   mesh::separate_into(walls_, volume, {{1, 2}, Scheme::kSix, true});
-  triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
+  surfaces_ = label_surfaces(walls_, {});
   labels_ = {{.label = 1, .name = "Liver"}, {.label = 2, .name = "Spleen"}};
   const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
   EXPECT_EQ(model.items, 1U);

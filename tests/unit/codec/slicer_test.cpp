@@ -78,12 +78,6 @@ class PrusaSlicerTest : public test::LabelFilesTest {
     }
   }
 
-  mesh::Mesh surface_of(std::size_t label) const {
-    mesh::Mesh surface;
-    extract_label(walls_, *triangles_, label, surface);
-    return surface;
-  }
-
   test::TemporaryFolder folder_;
 
  private:

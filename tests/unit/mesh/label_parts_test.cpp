@@ -67,8 +67,7 @@ TEST(LabelParts, LabelsThatOverlapAreWholeAndClosed) {
     SCOPED_TRACE(describe(volume.dims, options));
     options.values = {{1, {1, 4}}, {2, {2, 4, 5}}};
     const SeparatingSurface surface = separated(volume, options);
-    const LabelTriangles triangles(surface);
-    const auto counts = count_label_triangles(volume.lattice(), options, {});
+    const auto counts = counted_triangles(volume.lattice(), options);
     for (std::size_t n = 1; n <= 3; ++n) {
       const Mesh mesh = label_mesh(surface, n);
       EXPECT_EQ(counts[n], mesh.triangles.size());

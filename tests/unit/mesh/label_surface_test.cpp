@@ -107,7 +107,7 @@ TEST(LabelWalls, AddUpToEachLabelsAreaOnAnyNumberOfThreads) {
   const SeparatingSurface surface =
       separated(label_noise(5, {9, 8, 7}, 3), {.labels = {1, 2, 3, 4}, .close = true});
   const WallAreas areas = walls_between(surface);
-  const auto measures = measure_labels(surface, LabelTriangles(surface), {});
+  const auto measures = label_measures(surface);
   double all = 0;
   std::vector<double> own(5, 0);
   for (const auto& [sides, area] : areas) {
@@ -154,25 +154,26 @@ TEST(LabelSurface, IsShadedByItsOutsideWhereAWallBegins) {
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 2))) {
     SCOPED_TRACE(describe(volume.dims, options));
     const SeparatingSurface surface = separated(volume, options);
-    Mesh mesh = label_mesh(surface, 1);
+    const LabelSurface label = std::move(label_surfaces(surface, {})[0]);
+    const Mesh& mesh = label.mesh;
     Buffer<Vec3> means;
     vertex_normals(mesh, {}, means);
-    shade_label(surface, LabelTriangles(surface), 1, {}, mesh);
-    ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+    const Buffer<Vec3> normals = shading_of(label, surface, {});
+    ASSERT_EQ(normals.size(), mesh.positions.size());
     double shaded = 0;
     double mean = 0;
     std::size_t on_edge = 0;
     std::size_t on_wall = 0;
-    for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
+    for (std::size_t v = 0; v < normals.size(); ++v) {
       const Vec3& p = mesh.positions[v];
       if (p[0] < 6.2F || p[2] < 4 || p[2] > 8) continue;
       if (p[1] > 9.2F) {
         ++on_edge;
-        shaded += mesh.normals[v][1];
+        shaded += normals[v][1];
         mean += means[v][1];
       } else if (p[1] > 4 && p[1] < 8) {
         ++on_wall;
-        EXPECT_GT(mesh.normals[v][0], 0.99F);
+        EXPECT_GT(normals[v][0], 0.99F);
       }
     }
     ASSERT_GT(on_edge, 2U);
@@ -188,10 +189,11 @@ TEST(LabelSurface, HasTheTrianglesThatWereCounted) {
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 9))) {
     SCOPED_TRACE(describe(volume.dims, options));
     const SeparatingSurface surface = separated(volume, options);
-    const LabelTriangles triangles(surface);
-    const auto counts = count_label_triangles(volume.lattice(), options, {});
+    const auto own = label_surfaces(surface, {});
+    const auto counts = counted_triangles(volume.lattice(), options);
     ASSERT_EQ(counts.size(), 10U);
-    for (std::size_t n = 1; n < counts.size(); ++n) EXPECT_EQ(counts[n], triangles.of(n).size());
+    for (std::size_t n = 1; n < counts.size(); ++n)
+      EXPECT_EQ(counts[n], own[n - 1].triangles.size());
   }
 }
 
@@ -224,7 +226,7 @@ TEST(LabelVolumes, FillTheBoxOfTheVoxels) {
       const auto labels = select_labels(count_labels(volume.lattice(), {}), 99);
       const SeparatingSurface surface = separated(volume, {labels, scheme, true});
       double sum = 0;
-      for (const LabelMeasure& label : measure_labels(surface, LabelTriangles(surface), {})) {
+      for (const LabelMeasure& label : label_measures(surface)) {
         EXPECT_TRUE(label.is_closed());
         sum += label.extent.volume_mm3;
       }
@@ -252,7 +254,7 @@ TEST(LabelVolumes, AreThatOfTheirUnionAndAboutThatOfTheVoxels) {
     SeparatingSurface surface = separated(volume, {labels, scheme, true});
     for (const int passes : {0, 10}) {
       smooth({.steps = test::means(passes, {1}), .max_displacement_mm = 0.5}, {}, surface.mesh);
-      const auto measures = measure_labels(surface, LabelTriangles(surface), {});
+      const auto measures = label_measures(surface);
       double sum = 0;
       double voxels = 0;
       for (std::size_t n = 0; n < measures.size(); ++n) {
@@ -275,7 +277,7 @@ TEST(LabelVolumes, OfAnAtlasAreThatOfItsVoxels) {
   EXPECT_EQ(labels.size(), 116U);
   const SeparatingSurface surface = separated(volume, {labels});
   double sum = 0;
-  for (const LabelMeasure& label : measure_labels(surface, LabelTriangles(surface), {})) {
+  for (const LabelMeasure& label : label_measures(surface)) {
     EXPECT_TRUE(label.is_closed());
     EXPECT_TRUE(label.topology.manifold);
     EXPECT_TRUE(label.topology.oriented);
@@ -291,7 +293,7 @@ TEST(MeasureLabels, SaysWhatEachSurfaceIs) {
   const auto volume = label_cells(9, {40, 21, 30}, 12, 95);
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 9))) {
     const SeparatingSurface surface = separated(volume, options);
-    const auto measures = measure_labels(surface, LabelTriangles(surface), {});
+    const auto measures = label_measures(surface);
     ASSERT_EQ(measures.size(), 9U);
     for (std::size_t n = 0; n < measures.size(); ++n) {
       const Mesh mesh = label_mesh(surface, n + 1);
@@ -319,7 +321,7 @@ TEST(MeasureLabels, IsTheSameForAnyNumberOfThreads) {
       separated(label_cells(9, {40, 21, 30}, 12, 96), {consecutive<std::int64_t>(1, 9)});
   test::expect_same_on_any_threads([&] {
     std::vector<double> result;
-    for (const LabelMeasure& m : measure_labels(surface, LabelTriangles(surface), {})) {
+    for (const LabelMeasure& m : label_measures(surface)) {
       result.insert(result.end(), {m.extent.area_mm2, m.extent.volume_mm3, m.extent.low[0]});
     }
     return result;
@@ -331,7 +333,7 @@ TEST(MeasureLabels, EndsWhenItIsCancelled) {
   std::stop_source source;
   source.request_stop();
   EXPECT_EQ(test::code_thrown_by([&] {
-              measure_labels(surface, LabelTriangles(surface), {source.get_token(), {}});
+              measure_labels(surface, label_surfaces(surface, {}), {source.get_token(), {}});
             }),
             ErrorCode::kCancelled);
 }

@@ -31,10 +31,10 @@ void expect_regular_walls(const SampleVolume<std::uint8_t>& volume,
   EXPECT_EQ(regular.mesh.layer_triangles, count.layer_triangles);
   ASSERT_TRUE(test::matches(regular, plain, reference));
   ASSERT_TRUE(has_topology_of(regular, plain, reference));
-  const auto counted = count_label_triangles(lattice, regularized(options), {});
-  const LabelTriangles triangles(regular);
+  const auto counted = counted_triangles(lattice, regularized(options));
+  const auto own = label_surfaces(regular, {});
   for (std::size_t n = 1; n < counted.size(); ++n) {
-    EXPECT_EQ(counted[n], triangles.of(n).size()) << "label " << n;
+    EXPECT_EQ(counted[n], own[n - 1].triangles.size()) << "label " << n;
   }
 }
 
@@ -95,9 +95,9 @@ TEST(RegularLabels, ThatOverlapAreManifolds) {
       const SeparatingSurface regular = separated(volume, regularized(options));
       const bool is_compact = seed % 2 == 1;  // noise is nothing but junctions
       EXPECT_TRUE(!is_compact || regular.mesh.triangles.size() < plain.mesh.triangles.size());
-      const auto before = measure_labels(plain, LabelTriangles(plain), {});
-      const auto after = measure_labels(regular, LabelTriangles(regular), {});
-      const auto counted = count_label_triangles(volume.lattice(), regularized(options), {});
+      const auto before = label_measures(plain);
+      const auto after = label_measures(regular);
+      const auto counted = counted_triangles(volume.lattice(), regularized(options));
       for (std::size_t n = 0; n < after.size(); ++n) {
         EXPECT_TRUE(after[n].topology.manifold && after[n].topology.oriented);
         EXPECT_EQ(after[n].topology.euler, before[n].topology.euler);
@@ -133,8 +133,7 @@ TEST(RegularLabels, HaveTheSameBytesOnEveryNumberOfThreads) {
     SCOPED_TRACE(describe(volume.dims, options));
     test::expect_same_on_any_threads([&] { return separated(volume, options); }, test::kSameBytes,
                                      {3, 16, 200});
-    test::expect_same_on_any_threads(
-        [&] { return count_label_triangles(volume.lattice(), options, {}); });
+    test::expect_same_on_any_threads([&] { return counted_triangles(volume.lattice(), options); });
   }
 }
 

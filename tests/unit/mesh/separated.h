@@ -96,9 +96,17 @@ inline test::SampleVolume<std::uint8_t> label_cells(std::size_t count, const Dim
 }
 
 inline Mesh label_mesh(const SeparatingSurface& surface, std::size_t number) {
-  Mesh mesh;
-  extract_label(surface, LabelTriangles(surface), number, mesh);
-  return mesh;
+  return std::move(label_surfaces(surface, {})[number - 1].mesh);
+}
+
+inline std::vector<LabelMeasure> label_measures(const SeparatingSurface& surface) {
+  return measure_labels(surface, label_surfaces(surface, {}), {});
+}
+
+template <class T>
+std::vector<std::uint64_t> counted_triangles(const Lattice<T>& lattice,
+                                             const SeparateOptions& options) {
+  return count_label_triangles(lattice, options, count_walls(lattice, options, {}), {});
 }
 
 inline testing::AssertionResult same_bytes(const SeparatingSurface& a, const SeparatingSurface& b) {

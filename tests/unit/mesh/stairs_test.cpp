@@ -71,7 +71,7 @@ std::map<std::int64_t, double> voxels_mm3(const Labels& volume) {
 }
 
 std::vector<LabelMeasure> measured(const SeparatingSurface& surface) {
-  return measure_labels(surface, LabelTriangles(surface), {});
+  return label_measures(surface);
 }
 
 // The volume that fans owe each label, in voxels.
