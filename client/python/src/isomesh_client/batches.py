@@ -89,7 +89,8 @@ class Batches:
         formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
         normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
         merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
-        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED,
+        min_thickness_mm: api.MinThickness = OMITTED, callback: api.Callback = OMITTED,
         # End of the parameters.
     ) -> List[Result]:
         """Meshes many volumes: `client.mesh_all(Path("scans").glob("*.nii.gz"), to="meshes/{name}.glb", iso=60)`.

@@ -102,7 +102,8 @@ class Client(Batches):
         formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
         normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
         merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
-        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED,
+        min_thickness_mm: api.MinThickness = OMITTED, callback: api.Callback = OMITTED,
         # End of the parameters.
     ) -> Mesh:
         """Makes a mesh of a volume in one call: `client.mesh("head.nii.gz", iso=60)`.
@@ -238,7 +239,8 @@ class Client(Batches):
         formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
         normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
         merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
-        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED,
+        min_thickness_mm: api.MinThickness = OMITTED, callback: api.Callback = OMITTED,
         # End of the parameters.
     ) -> api.Job:
         """Starts a job and returns at once: `client.submit(volume, iso=60, formats=["glb", "stl"])`.
@@ -341,7 +343,8 @@ class Client(Batches):
         formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
         normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
         merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
-        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED,
+        min_thickness_mm: api.MinThickness = OMITTED, callback: api.Callback = OMITTED,
         # End of the parameters.
     ) -> api.Estimate:
         """The exact numbers of triangles and vertices of a job, and what it takes, without running it."""
