@@ -36,7 +36,7 @@ std::optional<double> way_to(const Corners& triangle, const Point& from, const P
   const double c = dot(direction, turned) / scale;
   const double way = dot(ac, turned) / scale;
   if (!(b >= -kWider && c >= -kWider && b + c <= 1 + kWider && way >= 0)) return std::nullopt;
-  return way;
+  return std::abs(way);  // not -0
 }
 
 struct Block {
@@ -128,9 +128,22 @@ class Walls {
     const auto [a, b, c] = corners_of(surface_, met);
     const Point normal = normal_of(a, b, c);
     if (dot(normal, inward) < kFacing * std::sqrt(dot(normal, normal))) return kNothing;
+    if (is_edge(from, surface_.triangles[triangle], surface_.triangles[met])) return kNothing;
     while (way < most && !thinnest_mm_.compare_exchange_weak(most, way)) {
     }
     return way;
+  }
+
+  // True if two sides meet nearby.
+  bool is_edge(const Point& from, const Triangle& one, const Triangle& other) const {
+    std::vector<Point> common;
+    for (const std::uint32_t vertex : one) {
+      if (std::ranges::find(other, vertex) == other.end()) continue;
+      common.push_back(to_point(surface_.positions[vertex]));
+    }
+    if (common.empty()) return false;
+    const Corners corner = {common.front(), common.back(), common.back()};
+    return mesh::squared_distance(from, corner) < below_mm_ * below_mm_;
   }
 
   const SurfaceView surface_;

@@ -140,6 +140,23 @@ TEST(Thickness, IsThatOfTheWallOfAHollowBall) {
               0.02 * 600);
 }
 
+// A prism 20 mm long whose sides meet at an angle along y, 20 mm from its back.
+Body blade(double angle) {
+  const auto half = static_cast<float>(20 * std::tan(angle / 2));
+  return {{{0, 0, 0}, {20, 0, -half}, {20, 0, half}, {0, 20, 0}, {20, 20, -half}, {20, 20, half}},
+          {{0, 1, 2}, {3, 5, 4}, {0, 4, 1}, {0, 3, 4}, {0, 2, 5}, {0, 5, 3}, {1, 4, 5}, {1, 5, 2}}};
+}
+
+// Both sides are thin where they are nearer than 0.4 mm, but for what is 0.4 mm from the edge.
+TEST(Thickness, OfABladeBeginsBesideItsEdge) {
+  const double angle = 15 * std::numbers::pi / 180;
+  const double end = 0.4 / std::tan(angle);
+  EXPECT_NEAR(thickness_of(blade(angle), 0.4).thin_area_mm2, 2 * 20 * (end - 0.4), 2);
+  EXPECT_NEAR(thinnest_of(blade(angle)), 0.4 * std::tan(angle), 0.03);
+  // Hardly anything is thin beside an edge of 50 degrees: what has a corner alone in common.
+  EXPECT_LT(thickness_of(blade(50 * std::numbers::pi / 180), 0.4).thin_area_mm2, 0.1);
+}
+
 TEST(Thickness, IsThroughMaterialAlone) {
   // Two plates 0.1 mm apart, and a slit of 0.1 mm.
   Body plates = box_between({0, 0, 0}, {20, 20, 2});

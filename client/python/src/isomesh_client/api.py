@@ -738,11 +738,11 @@ class MeshSummary(TypedDict):
 class Thickness(TypedDict):
     """How thick the walls are. Only for a job with min_thickness_mm. The thickness at a point
     of the surface is the way from it through the material, against the normal of its triangle,
-    to the opposite side: the first triangle there, if it faces away within about 60 degrees. So
-    edges of 60 degrees and sharper are thin, and those of a cube are not. The gap between two
-    bodies is no wall. It is measured at the centres of all triangles, and of the parts into
-    which large ones are divided, in the mesh before files round its coordinates. Of labels, in
-    each label's own surface."""
+    to the opposite side: the first triangle there, if it faces away within about 60 degrees. An
+    edge is no wall: nearer than min_thickness_mm to where both sides meet, there is no
+    thickness. The gap between two bodies is no wall. It is measured at the centres of all
+    triangles, and of the parts into which large ones are divided, in the mesh before files
+    round its coordinates. Of labels, in each label's own surface."""
 
     #: The least thickness. null if no point has an opposite side, for example in an open sheet.
     thinnest_mm: Optional[float]
