@@ -218,6 +218,12 @@ void visit(Is<MeshCertificate> auto& self, auto&& field) {
   }
 }
 
+void visit(Is<Thickness> auto& self, auto&& field) {
+  field("thinnest_mm", self.thinnest_mm);
+  field("place", self.place);
+  field("thin_area_mm2", self.thin_area_mm2);
+}
+
 void visit(Is<Untangling> auto& self, auto&& field) {
   field("pairs", self.pairs);
   field("vertices", self.vertices);
@@ -310,6 +316,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   }
   if (is_told(self, self.certificate.has_value())) {
     field("certificate", self.certificate);
+  }
+  if (is_told(self, self.thickness.has_value())) {
+    field("thickness", self.thickness);
   }
 }
 

@@ -248,6 +248,15 @@ struct Untangling {
   bool operator==(const Untangling&) const = default;
 };
 
+// How thick walls are, measured through the material at points of the surface.
+struct Thickness {
+  std::optional<double> thinnest_mm = {};           // none if no point has a wall behind it
+  std::optional<std::array<double, 3>> place = {};  // of that point; mm, LPS
+  double thin_area_mm2 = 0;  // of the surface whose wall is thinner than min_thickness_mm
+
+  bool operator==(const Thickness&) const = default;
+};
+
 struct Simplification {
   enum class Bound { kError, kTriangles, kTopology };
 
@@ -313,6 +322,7 @@ struct MeshSummary {
   std::optional<std::uint64_t> walls_count = {};
   std::optional<LabelListFile> wall_list = {};
   std::optional<MeshCertificate> certificate = {};
+  std::optional<Thickness> thickness = {};  // if requested
 
   bool operator==(const MeshSummary&) const = default;
 };

@@ -466,6 +466,20 @@ constinit const Parameter kCertify = {
         "where they intersect themselves.",
     .may_be_absent = true};
 
+constinit const Parameter kMinThicknessMm = {
+    .name = "min_thickness_mm",
+    .title = "Nozzle's width",
+    .help =
+        "Measure how thick walls are, and the area of those that are "
+        "thinner than this, such as the width of a printer's nozzle.",
+    .more =
+        "In millimetres. It changes no file: nothing is made thicker. "
+        "`mesh.thickness` has the result.",
+    .unit = "mm",
+    .minimum = 0.001,
+    .maximum = 1000,
+    .may_be_absent = true};
+
 constinit const Parameter kCallback = {.name = "callback",
                                        .help = "URL that the server calls when the job has ended.",
                                        .may_be_absent = true,

@@ -113,12 +113,20 @@ struct MeshParameters {
   bool operator==(const MeshParameters&) const = default;
 };
 
-// A job request: the mesh's parameters, the volume, the priority and the callback.
-struct JobParameters : MeshParameters {
+// Measurements beside the files, which do not depend on them.
+struct Measures {
+  bool certify = false;  // the deviation of the files from the surface as extracted
+  // The thickness of walls, with the area of those thinner than this; empty: not measured.
+  std::optional<double> min_thickness_mm = {};
+
+  bool operator==(const Measures&) const = default;
+};
+
+// A job request: the mesh's parameters, the volume, the priority, the callback and what to measure.
+struct JobParameters : MeshParameters, Measures {
   std::string volume;
   Priority priority = Priority::kRoutine;
   std::optional<Callback> callback = {};
-  bool certify = false;  // measures the deviation of the files from the surface as extracted
 
   bool operator==(const JobParameters&) const = default;
 };
@@ -160,7 +168,7 @@ extern const Parameter kIso, kLabels, kBackground, kLabelNames, kLabelColors, kL
     kInterpolation, kRegularize, kPasses, kSmoothing, kLambda, kPassBand, kMaxDisplacementMm,
     kUntangle, kClose, kComponents, kFillCavities, kCrop, kMaxErrorMm, kTriangles, kFormats, kDraco,
     kNormals, kDistances, kLods, kMerge, kGlbCodec, kSpace;
-extern const Parameter kVolume, kPriority, kCertify, kCallback;
+extern const Parameter kVolume, kPriority, kCertify, kMinThicknessMm, kCallback;
 extern const Parameter kLabelName;  // of a member that a label names
 }  // namespace rows
 
@@ -225,6 +233,9 @@ void visit(Is<JobParameters> auto& self, auto&& parameter) {
   visit(mesh_parameters(self), parameter);
   parameter(rows::kPriority, self.priority);
   if (is_told(self, self.certify)) parameter(rows::kCertify, self.certify);
+  if (is_told(self, self.min_thickness_mm.has_value())) {
+    parameter(rows::kMinThicknessMm, self.min_thickness_mm);
+  }
   if (is_told(self, self.callback.has_value())) parameter(rows::kCallback, self.callback);
 }
 

@@ -17,6 +17,7 @@ enum class Stage {
   kSimplify,
   kEncode,
   kCertify,
+  kThickness,
   kDone
 };
 
@@ -30,6 +31,7 @@ struct Timing {
   double simplify = 0;
   double encode = 0;
   double certify = 0;
+  double thickness = 0;
   double total = 0;  // from acceptance to the end
 
   bool operator==(const Timing&) const = default;
@@ -56,6 +58,8 @@ inline constexpr std::array kStages = {
              &Timing::encode},
     StageRow{Stage::kCertify, "certify", "Measuring the error, if requested.", &Timing::certify,
              false},
+    StageRow{Stage::kThickness, "thickness", "Measuring the thickness of walls, if requested.",
+             &Timing::thickness, false},
     StageRow{Stage::kDone, "done", "", nullptr}};
 
 constexpr const StageRow& row_of(Stage stage) {

@@ -117,6 +117,10 @@ std::string pairs_text(std::uint64_t pairs) {
   return pairs == 1 ? "1 pair of triangles" : grouped(pairs) + " pairs of triangles";
 }
 
+std::string place_text(const std::array<double, 3>& place, const Units& in) {
+  return fixed(place[0], 2) + ", " + fixed(place[1], 2) + ", " + in.length(place[2], 2);
+}
+
 void tell_crossings(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (const auto& untangled = mesh.untangled) {
     const std::string moved =
@@ -130,10 +134,21 @@ void tell_crossings(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (!found) return;
   std::string text = found->pairs == 0 ? "none" : pairs_text(found->pairs);
   if (!found->places.empty()) {
-    const auto& [x, y, z] = found->places.front();
-    text += ", the first at " + fixed(x, 2) + ", " + fixed(y, 2) + ", " + in.length(z, 2);
+    text += ", the first at " + place_text(found->places.front(), in);
   }
   rows.push_back({"self-intersections", text});
+}
+
+void tell_thickness(const MeshSummary& mesh, const Units& in, Rows& rows) {
+  if (!mesh.thickness) return;
+  const Thickness& thickness = *mesh.thickness;
+  if (!thickness.thinnest_mm || !thickness.place) {
+    rows.push_back({"thinnest wall", "none: no place has another side behind it"});
+    return;
+  }
+  rows.push_back({"thinnest wall", in.length(*thickness.thinnest_mm, 3) + " at " +
+                                       place_text(*thickness.place, in)});
+  rows.push_back({"  too thin", in.area(thickness.thin_area_mm2) + " of the surface"});
 }
 
 void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
@@ -242,6 +257,7 @@ std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
   const MeshQuality& quality = mesh.quality;
   rows.push_back({"topology", topology_of(quality)});
   tell_crossings(mesh, in, rows);
+  tell_thickness(mesh, in, rows);
   rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
                                       fixed(quality.aspect_ratio.smoothed.mean, 3) + " smoothed"});
   rows.push_back({"smallest angle", fixed(quality.smallest_angle_deg.extracted.mean, 1) +

@@ -219,12 +219,11 @@ class Run {
       const Lock lock(mutex_);
       progress_ = share;
     };
-    jobs::Progress progress(stop, report,
-                            jobs::expected_times(volume, parameters, parameters.certify));
+    jobs::Progress progress(stop, report, jobs::expected_times(volume, parameters, parameters));
     const jobs::MeshRequest request = {.volume = volume,
                                        .parameters = parameters,
                                        .iso = iso,
-                                       .certify = parameters.certify,
+                                       .measures = parameters,
                                        .memory_bytes = given_.memory_bytes};
     auto made = jobs::make_from_samples(samples, request, {}, progress, workspace_);
     if (parameters.labels) {

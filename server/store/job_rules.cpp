@@ -38,6 +38,7 @@ std::string result_key(const Volume& volume, const JobParameters& parameters,
                      to_json(static_cast<const MeshParameters&>(parameters));
   if (!parameters.iso && !parameters.labels) text += "\niso " + to_text(volume.suggested_iso);
   if (parameters.certify) text += "\ncertified";
+  if (parameters.min_thickness_mm) text += "\nthickness " + to_text(*parameters.min_thickness_mm);
   for (const Note& note : notes_in_mesh(volume.notes))
     text += '\n' + note.code + ": " + note.detail;
   return sha256_of(text);

@@ -57,14 +57,29 @@ TEST_F(MeshTest, TellsItsTimings) {
   const std::string timing = get().header("server-timing");
   std::size_t last = 0;
   for (const std::string stage : {"queue", "load", "extract", "smooth", "untangle", "simplify",
-                                  "encode", "certify", "total"}) {
+                                  "encode", "certify", "thickness", "total"}) {
     const std::size_t found = timing.find(stage + ";dur=");
     ASSERT_NE(found, std::string::npos) << timing;
     EXPECT_GE(found, last);
-    const bool has_run = stage != "untangle" && stage != "simplify" && stage != "certify";
+    const bool has_run =
+        stage != "untangle" && stage != "simplify" && stage != "certify" && stage != "thickness";
     EXPECT_EQ(std::stod(timing.substr(found + stage.size() + 5)) > 0, has_run) << stage;
     last = found;
   }
+}
+
+TEST_F(MeshTest, TellsTheThinnestWallThatIsAskedFor) {
+  EXPECT_FALSE(job_.mesh->thickness);
+  const Job job = finished_job(daemon_, R"("formats": ["stl"], "min_thickness_mm": 500)");
+  EXPECT_EQ(job.mesh->files.at(MeshFormat::kStl).sha256, file_.sha256);
+  const Thickness& thickness = job.mesh->thickness.value();
+  EXPECT_GT(thickness.thinnest_mm.value(), 0.5);
+  EXPECT_GT(thickness.thin_area_mm2, 0);
+  EXPECT_GT(job.timing.thickness, 0);
+  const Answer answer = daemon_.send(
+      "POST", "/v1/jobs", job_body(job.parameters.volume, 100, R"("min_thickness_mm": 0)"));
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kInvalidParameter));
+  EXPECT_THAT(answer.body, HasSubstr("min_thickness_mm"));
 }
 
 TEST_F(MeshTest, AFormatThatWasNotAskedForIsNotFound) {

@@ -165,9 +165,11 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   job.parameters.fill_cavities = true;
   job.parameters.distances = true;
   job.parameters.certify = true;
+  job.parameters.min_thickness_mm = 0.4;
   job.parameters.untangle = true;
   job.mesh->untangled.emplace();
   job.mesh->simplified.emplace();
+  job.mesh->thickness.emplace().place = {{1, 2, 3}};
   MeshCertificate& certificate = job.mesh->certificate.emplace();
   certificate.budget_mm.emplace();
   certificate.bound_mm = 0.1;  // and the opposite, to have every member

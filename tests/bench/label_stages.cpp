@@ -102,7 +102,7 @@ std::vector<mesh::LabelMeasure> LabelStages::measure() const {
 
 JobFigures LabelStages::run_job(bool certify) {
   return bench::run_job(
-      samples_, parameters_, 0, certify,
+      samples_, parameters_, 0, {.certify = certify},
       [&](const jobs::SampleArray& array, const jobs::MeshRequest& request,
           std::span<const codec::Sink> sinks, jobs::Progress& progress) {
         return jobs::make_labels(array, request, sinks, progress, surface_).summary;

@@ -107,11 +107,11 @@ std::string Stages::drc() const {
 }
 
 JobFigures run_job(const Samples& samples, const MeshParameters& parameters, double iso,
-                   bool certify, const MakeJob& make) {
+                   const Measures& measures, const MakeJob& make) {
   CountingSink counting;
   const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
   const jobs::Report nobody = [](Stage, double, const Timing&) {};
-  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, {}, parameters, certify));
+  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, {}, parameters, measures));
   const auto& [x, y, z] = samples.dims;
   const Volume volume;
   JobFigures figures;
@@ -119,7 +119,7 @@ JobFigures run_job(const Samples& samples, const MeshParameters& parameters, dou
                       {.volume = volume,
                        .parameters = parameters,
                        .iso = iso,
-                       .certify = certify,
+                       .measures = measures,
                        .memory_bytes = std::numeric_limits<std::uint64_t>::max()},
                       sinks, progress);
   progress.end_stage();
@@ -134,7 +134,7 @@ JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
   parameters.interpolation = surface_.interpolation;
   parameters.close = surface_.close;
   parameters.regularize = surface_.regularize;
-  return bench::run_job(samples_, parameters, surface_.iso, certify,
+  return bench::run_job(samples_, parameters, surface_.iso, {.certify = certify},
                         [&](const jobs::SampleArray& array, const jobs::MeshRequest& request,
                             std::span<const codec::Sink> sinks, jobs::Progress& progress) {
                           return jobs::make_mesh(array, request, sinks, progress, mesh_);

@@ -46,7 +46,7 @@ struct JobFigures {
 using MakeJob = std::function<MeshSummary(const jobs::SampleArray&, const jobs::MeshRequest&,
                                           std::span<const codec::Sink>, jobs::Progress&)>;
 JobFigures run_job(const Samples& samples, const MeshParameters& parameters, double iso,
-                   bool certify, const MakeJob& make);
+                   const Measures& measures, const MakeJob& make);
 
 // Threads that the stages run on, 1 at least. Not while one runs.
 void set_threads(int threads);

@@ -53,7 +53,7 @@ ErrorBudget budget_of(const MeshParameters& parameters, const mesh::Mesh& mesh,
 
 KeptFiles::KeptFiles(const MeshRequest& request, std::span<const codec::Sink> sinks)
     : sinks_(sinks.begin(), sinks.end()) {
-  if (!request.certify) return;
+  if (!request.measures.certify) return;
   const std::vector<MeshFormat> files = files_of(request.parameters);
   for (std::size_t i = 0; i < sinks.size(); ++i) {
     if (!codec::rounds(files[i], request.parameters)) continue;
@@ -67,7 +67,7 @@ KeptFiles::KeptFiles(const MeshRequest& request, std::span<const codec::Sink> si
 void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
                    const KeptFiles& files, Progress& progress, const mesh::Mesh& mesh,
                    MeshSummary& summary) {
-  if (!request.certify) return;
+  if (!request.measures.certify) return;
   const MeshParameters& parameters = request.parameters;
   progress.enter(Stage::kCertify);
   const mesh::Context stage = progress.context();

@@ -20,7 +20,8 @@ void visit(Is<JobOrder> auto& self, auto&& field) {
   field("notes", self.volume.notes);
   field("parameters", self.parameters);
   field("iso", self.iso);
-  field("certify", self.certify);
+  field("certify", self.measures.certify);
+  field("min_thickness_mm", self.measures.min_thickness_mm);
   field("memory_bytes", self.memory_bytes);
   field("disk_bytes", self.disk_bytes);
   field("expected", self.expected);

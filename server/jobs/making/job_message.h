@@ -39,7 +39,7 @@ struct JobOrder {
   Volume volume;  // its samples and notes
   MeshParameters parameters;
   double iso = 0;  // resolved; the parameters may name none
-  bool certify = false;
+  Measures measures = {};
   std::uint64_t memory_bytes = 0;
   std::uint64_t disk_bytes = 0;  // of all files together
   Timing expected = {};          // of a mesh; progress follows it

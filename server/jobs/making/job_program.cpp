@@ -104,7 +104,7 @@ MeshRequest request_of(const JobOrder& order) {
   return {.volume = order.volume,
           .parameters = order.parameters,
           .iso = order.iso,
-          .certify = order.certify,
+          .measures = order.measures,
           .memory_bytes = order.memory_bytes,
           .disk_bytes = order.disk_bytes};
 }

@@ -147,6 +147,8 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
                      summary);
   certify_stage(written, extracted, files, progress, mesh, summary);
+  const auto itself = [&](std::size_t) -> const mesh::Mesh& { return mesh; };
+  thickness_stage(request, 1, itself, progress, summary);
   return summary;
 }
 

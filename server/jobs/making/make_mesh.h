@@ -79,7 +79,7 @@ struct MeshRequest {
   const Volume& volume;  // its samples and notes, for the files to name
   const MeshParameters& parameters;
   double iso;  // resolved; the parameters may name none
-  bool certify;
+  Measures measures;
   std::uint64_t memory_bytes;
   // For all files together, if the disk held nothing else.
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
@@ -88,7 +88,7 @@ struct MeshRequest {
 
   // The same with other parameters, which must outlive it.
   MeshRequest with(const MeshParameters& others) const {
-    return {volume, others, iso, certify, memory_bytes, disk_bytes, spool};
+    return {volume, others, iso, measures, memory_bytes, disk_bytes, spool};
   }
 };
 

@@ -36,7 +36,7 @@ MadeLabels make_from_samples(const SampleArray& samples, const MeshRequest& requ
   const MeshRequest own = {.volume = volume,
                            .parameters = request.parameters,
                            .iso = request.iso,
-                           .certify = request.certify,
+                           .measures = request.measures,
                            .memory_bytes = memory_bytes,
                            .disk_bytes = request.disk_bytes,
                            .spool = request.spool};

@@ -61,7 +61,7 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
 // extracted surface, grids of triangles, and files that round coordinates, both as bytes and
 // decoded.
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                          const MeshParameters& parameters, bool certify) {
+                          const MeshParameters& parameters, const Measures& measures) {
   // From simplify.h, bound.h and triangle_grid.h, and a little more.
   constexpr std::uint64_t kSimplifyBytesPerTriangle = 220;
   constexpr std::uint64_t kProveBytesPerTriangle = 260;
@@ -76,10 +76,11 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
     simplifying = surface.triangles * kProveBytesPerTriangle + points * sizeof(float);
   }
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
-  // While files are encoded.
-  const std::uint64_t grid = parameters.distances ? surface.triangles * kGridsPerTriangle : 0;
+  // While files are encoded, and while thickness is measured.
+  const bool has_grid = parameters.distances || measures.min_thickness_mm;
+  const std::uint64_t grid = has_grid ? surface.triangles * kGridsPerTriangle : 0;
   const std::uint64_t untangling = parameters.untangle ? mesh::untangling_memory(surface) : 0;
-  if (!certify) {
+  if (!measures.certify) {
     const std::uint64_t positions = parameters.untangle ? surface.vertices * sizeof(mesh::Vec3) : 0;
     return std::max({untangling, simplifying, grid}) +
            (keeps_extracted ? mesh_bytes(surface) : positions);
@@ -112,10 +113,10 @@ bool is_regularized(const MeshParameters& parameters) {
   return parameters.regularize && (parameters.labels || !parameters.max_error_mm);
 }
 
-bool can_be_walked(const MeshParameters& parameters, bool certify) {
-  const bool is_whole = parameters.labels || certify || parameters.max_error_mm ||
-                        parameters.triangles || parameters.untangle || parameters.fill_cavities ||
-                        !parameters.components.keeps_all();
+bool can_be_walked(const MeshParameters& parameters, const Measures& measures) {
+  const bool is_whole = parameters.labels || measures.certify || measures.min_thickness_mm ||
+                        parameters.max_error_mm || parameters.triangles || parameters.untangle ||
+                        parameters.fill_cavities || !parameters.components.keeps_all();
   // Without files, the caller wants the mesh itself.
   return !is_whole && !parameters.formats.empty() && mesh::can_walk(smooth_options(parameters)) &&
          std::ranges::all_of(files_of(parameters), [&](MeshFormat format) {
@@ -123,9 +124,10 @@ bool can_be_walked(const MeshParameters& parameters, bool certify) {
          });
 }
 
-bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters, bool certify) {
+bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+               const Measures& measures) {
   constexpr std::uint64_t kFewTriangles = std::uint64_t{1} << 21;
-  if (!can_be_walked(parameters, certify)) return false;
+  if (!can_be_walked(parameters, measures)) return false;
   const bool is_set_aside = std::ranges::any_of(files_of(parameters), [&](MeshFormat format) {
     return codec::is_set_aside(format, parameters);
   });
@@ -165,8 +167,8 @@ bool sets_aside(std::uint64_t samples) {
 }
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                              const MeshParameters& parameters, bool certify) {
-  if (is_walked(surface, parameters, certify)) return walked_bytes(surface, samples, parameters);
+                              const MeshParameters& parameters, const Measures& measures) {
+  if (is_walked(surface, parameters, measures)) return walked_bytes(surface, samples, parameters);
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);
@@ -176,13 +178,13 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t sa
                                       : smoothing_memory(smooth_options(parameters), surface);
   return mesh_bytes(surface) + smoothing +
          (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding) +
-         error_bytes(surface, samples, parameters, certify);
+         error_bytes(surface, samples, parameters, measures);
 }
 
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                   const MeshRequest& request) {
   const std::uint64_t needed =
-      estimate_memory(surface, samples, request.parameters, request.certify);
+      estimate_memory(surface, samples, request.parameters, request.measures);
   const std::uint64_t allowed_bytes = request.memory_bytes;
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kMebibyte = 1 << 20;

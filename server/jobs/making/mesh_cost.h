@@ -23,12 +23,13 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 
 // True if a job at an iso-value can be made window by window (server/mesh/walk): its files can be
 // written as triangles come, and nothing else needs the surface as a whole.
-bool can_be_walked(const MeshParameters& parameters, bool certify);
+bool can_be_walked(const MeshParameters& parameters, const Measures& measures);
 
 // True if such a job is made so. A small surface of few windows would not keep all threads busy,
 // and one whose file is set aside first would take longer: it is made as a whole, which gives the
 // same.
-bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters, bool certify);
+bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+               const Measures& measures);
 
 // The options of that walk.
 mesh::WalkOptions walk_options(mesh::SmoothOptions smooth, const MeshParameters& parameters,
@@ -41,7 +42,7 @@ bool sets_aside(std::uint64_t samples);
 // An upper estimate of a job's peak memory beside its mapped volume: mesh, smoothing, encoders,
 // simplifying and certifying. For a surface of that size in a volume of so many samples.
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                              const MeshParameters& parameters, bool certify);
+                              const MeshParameters& parameters, const Measures& measures);
 
 // Throws Error kTooLarge with the estimate if that exceeds the limit.
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,

@@ -13,6 +13,7 @@
 #include "server/mesh/collapse/simplify.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/shapes.h"
+#include "server/mesh/measure/thickness.h"
 #include "server/mesh/smooth/smooth.h"
 #include "server/mesh/smooth/untangle.h"
 
@@ -106,7 +107,8 @@ bool is_simplified(const MeshParameters& parameters) {
 
 ExtractedSurface::ExtractedSurface(const MeshRequest& request, const mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
-  const bool is_measured = request.certify || parameters.max_error_mm || parameters.distances;
+  const bool is_measured =
+      request.measures.certify || parameters.max_error_mm || parameters.distances;
   if (!is_measured && !parameters.untangle) return;
   positions.assign(mesh.positions.begin(), mesh.positions.end());
   if (!is_measured) return;
@@ -215,6 +217,24 @@ void measure_final_shapes(const MeshParameters& parameters, const Progress& prog
                           const mesh::Mesh& mesh, MeshQuality& quality) {
   if (parameters.passes == 0 && !is_simplified(parameters)) return;
   set_final(measure_shapes(mesh, progress.quiet()), quality);
+}
+
+void thickness_stage(const MeshRequest& request, std::size_t surfaces, const MakeSurface& surface,
+                     Progress& progress, MeshSummary& summary) {
+  const std::optional<double>& least = request.measures.min_thickness_mm;
+  if (!least) return;
+  progress.enter(Stage::kThickness);
+  Thickness& all = summary.thickness.emplace();
+  const double part = 1 / static_cast<double>(surfaces);
+  for (std::size_t n = 0; n < surfaces; ++n) {
+    const auto begin = static_cast<double>(n);
+    const Thickness one = measure_thickness(
+        surface(n), *least, progress.context().part(part * begin, part * (begin + 1)));
+    all.thin_area_mm2 += one.thin_area_mm2;
+    if (!one.thinnest_mm || all.thinnest_mm.value_or(*one.thinnest_mm) < *one.thinnest_mm) continue;
+    all.thinnest_mm = one.thinnest_mm;
+    all.place = one.place;
+  }
 }
 
 mesh::SurfaceSize size_of(const mesh::Mesh& mesh) {

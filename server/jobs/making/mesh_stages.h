@@ -83,6 +83,12 @@ void simplify_stage(const SampleArray& samples, const MeshRequest& request,
 void measure_final_shapes(const MeshParameters& parameters, const Progress& progress,
                           const mesh::Mesh& mesh, MeshQuality& quality);
 
+// Measures how thick the walls are, if the job asks for it: those of each of so many closed
+// surfaces, which `surface` makes.
+using MakeSurface = std::function<const mesh::Mesh&(std::size_t number)>;
+void thickness_stage(const MeshRequest& request, std::size_t surfaces, const MakeSurface& surface,
+                     Progress& progress, MeshSummary& summary);
+
 // Writes the size of the mesh into the summary.
 mesh::SurfaceSize size_of(const mesh::Mesh& mesh);
 void set_size(const mesh::SurfaceSize& surface, MeshSummary& summary);

@@ -25,6 +25,7 @@ constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
 constexpr double kLevelsPerTriangle = 7.5e-4;
 constexpr double kGridPerTriangle = 3.0e-4;  // of both surfaces, and of what intersects in one
 constexpr double kDistancePerPoint = 5.0e-4;
+constexpr double kThicknessPerTriangle = 1.0e-3;
 
 double as_double(std::uint64_t count) { return static_cast<double>(count); }
 
@@ -71,6 +72,10 @@ double certify_ms(const SurfaceSize& surface, const SurfaceSize& written, const 
           kDistancePerPoint * (points(surface) + points(written)));
 }
 
+double thickness_ms(const SurfaceSize& written, const VolumeSize& volume) {
+  return uneven_factor(volume) * kThicknessPerTriangle * as_double(written.triangles);
+}
+
 // Formats are written in parallel, so the slowest counts fully and the others by half.
 double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   double slowest = kMeasurePerTriangle;
@@ -101,7 +106,8 @@ VolumeSize VolumeSize::of(const Volume& volume) {
 }
 
 Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written,
-                   const VolumeSize& volume, const MeshParameters& parameters, bool certify) {
+                   const VolumeSize& volume, const MeshParameters& parameters,
+                   const Measures& measures) {
   Timing times;
   times.load = kMillisecondsPerJob + kLoadPerSample * as_double(volume.samples);
   times.extract = extract_ms(extracted, volume.samples);
@@ -109,7 +115,8 @@ Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written,
   times.untangle = untangle_ms(extracted, parameters);
   times.simplify = simplify_ms(extracted, parameters);
   times.encode = encode_ms(written, parameters);
-  if (certify) times.certify = certify_ms(extracted, written, volume, parameters);
+  if (measures.certify) times.certify = certify_ms(extracted, written, volume, parameters);
+  if (measures.min_thickness_mm) times.thickness = thickness_ms(written, volume);
   return times;
 }
 
@@ -133,7 +140,8 @@ SurfaceSize simplified_surface(const SurfaceSize& extracted, const MeshParameter
   return result;
 }
 
-Timing expected_times(const Volume& volume, const MeshParameters& parameters, bool certify) {
+Timing expected_times(const Volume& volume, const MeshParameters& parameters,
+                      const Measures& measures) {
   VolumeSize size = VolumeSize::of(volume);
   auto samples = as_double(size.samples);
   if (parameters.crop) {
@@ -147,11 +155,11 @@ Timing expected_times(const Volume& volume, const MeshParameters& parameters, bo
   size.samples = static_cast<std::uint64_t>(samples);
   const SurfaceSize extracted = typical_surface(samples);
   const SurfaceSize written = simplified_surface(extracted, parameters, size.smallest_spacing_mm);
-  return stage_times(extracted, written, size, parameters, certify);
+  return stage_times(extracted, written, size, parameters, measures);
 }
 
 double expected_ms(const Volume& volume, const JobParameters& parameters) {
-  const Timing times = expected_times(volume, parameters, parameters.certify);
+  const Timing times = expected_times(volume, parameters, parameters);
   double sum = 0;
   for (const StageRow& row : kStages) {
     if (row.elapsed != nullptr) sum += times.*row.elapsed;

@@ -22,7 +22,8 @@ struct VolumeSize {
 // of 7.1 million voxels and five million triangles on two cores, and those of uneven spacing from
 // labels. `extracted` and `written` are the sizes before and after simplification.
 Timing stage_times(const mesh::SurfaceSize& extracted, const mesh::SurfaceSize& written,
-                   const VolumeSize& volume, const MeshParameters& parameters, bool certify);
+                   const VolumeSize& volume, const MeshParameters& parameters,
+                   const Measures& measures);
 
 // The fraction of the triangles that simplification leaves within an error. A guess.
 double share_within(double error_mm, double spacing_mm);
@@ -33,7 +34,8 @@ mesh::SurfaceSize simplified_surface(const mesh::SurfaceSize& extracted,
                                      double correction = 1);
 
 // The times of a job before any sample of its volume is read, for a surface of typical size.
-Timing expected_times(const Volume& volume, const MeshParameters& parameters, bool certify);
+Timing expected_times(const Volume& volume, const MeshParameters& parameters,
+                      const Measures& measures);
 // Their sum, in milliseconds.
 double expected_ms(const Volume& volume, const JobParameters& parameters);
 

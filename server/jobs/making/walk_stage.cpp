@@ -94,7 +94,7 @@ std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequ
   return with_sample(samples.type, [&](auto sample) -> std::optional<MeshSummary> {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const std::uint64_t count = lattice.dims.samples();
-    const bool is_large = can_be_walked(parameters, request.certify) && sets_aside(count);
+    const bool is_large = can_be_walked(parameters, request.measures) && sets_aside(count);
     mesh::Spool* const spool = is_large ? request.spool : nullptr;
     Files files;
     for (bool is_first = true; is_first || !files.empty(); is_first = false) {
@@ -103,7 +103,7 @@ std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequ
       mesh::SurfaceWindows windows(lattice, options, extracting.part(0, kCounting), spool);
       const mesh::SurfaceSize surface = size_of(windows.count());
       check_memory(surface, count, request);
-      if (!is_walked(surface, parameters, request.certify)) {
+      if (!is_walked(surface, parameters, request.measures)) {
         windows.write_whole(extracting.part(kCounting, 1), mesh);
         return std::nullopt;
       }

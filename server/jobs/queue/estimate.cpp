@@ -62,8 +62,7 @@ void CostModel::learn(const Job& job, const VolumeSize& volume) {
     extracted.triangles = job.mesh->simplified->triangles_before;
     extracted.vertices = extracted.triangles / 2;
   }
-  const Timing guessed =
-      stage_times(extracted, surface, volume, job.parameters, job.parameters.certify);
+  const Timing guessed = stage_times(extracted, surface, volume, job.parameters, job.parameters);
   for (std::size_t n = 0; n < kStages.size(); ++n) {
     const auto elapsed = kStages[n].elapsed;
     if (elapsed == nullptr) continue;
@@ -88,7 +87,7 @@ void CostModel::learn(const Job& job, const VolumeSize& volume) {
 
 double CostModel::milliseconds(const SurfaceSize& surface, const SurfaceSize& written,
                                const VolumeSize& volume, const JobParameters& parameters) const {
-  const Timing times = stage_times(surface, written, volume, parameters, parameters.certify);
+  const Timing times = stage_times(surface, written, volume, parameters, parameters);
   double sum = 0;
   for (std::size_t n = 0; n < kStages.size(); ++n) {
     const auto elapsed = kStages[n].elapsed;
@@ -127,7 +126,7 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   const std::uint64_t samples = std::uint64_t{volume.dims[0]} * volume.dims[1] * volume.dims[2];
-  estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters.certify);
+  estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters);
   if (parameters.labels && !is_integer(volume.type)) {
     estimate.memory_bytes += samples * sizeof(std::int32_t);  // rounded
   }

@@ -55,10 +55,10 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                           .volume = volume,
                           .parameters = parameters,
                           .iso = parameters.iso.value_or(volume.suggested_iso),
-                          .certify = parameters.certify,
+                          .measures = parameters,
                           .memory_bytes = limits.memory_bytes,
                           .disk_bytes = disk_for_files(blobs, volume),
-                          .expected = expected_times(volume, parameters, parameters.certify)};
+                          .expected = expected_times(volume, parameters, parameters)};
   MadeMesh made = make_from_volume(blobs, volume.samples, stop,
                                    [&] { return process.make(order, sinks, stop, pass_on); });
   const auto stored = Clock::now();

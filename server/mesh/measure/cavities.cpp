@@ -91,7 +91,8 @@ double x_at(const Point& a, const Point& b, const Point& c, const Point& point) 
 int crossings(const Point& point, const TriangleGrid& walls, double end_x,
               std::vector<std::uint32_t>& near) {
   near.clear();
-  walls.visit_along_x(point, end_x, [&](std::uint32_t triangle) { near.push_back(triangle); });
+  const Point end = {end_x, point[1], point[2]};
+  walls.visit_along(point, end, [&](std::uint32_t triangle) { near.push_back(triangle); });
   std::ranges::sort(near);
   near.erase(std::unique(near.begin(), near.end()), near.end());
   int sum = 0;

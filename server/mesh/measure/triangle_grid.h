@@ -46,17 +46,17 @@ class TriangleGrid {
   // Returns kNone and infinity if there is none.
   Nearest within(const Point& point, double squared_mm, std::uint32_t guess) const;
 
-  // Calls visit(triangle) for all triangles that the line along +x from the point to the finite x
-  // may meet; for some several times, and for some others near it. Returns how many cells it looked
-  // into.
+  // Calls visit(triangle) for all triangles that the line between two finite points may meet; for
+  // some several times, and for some others near it. `to` may come nearer meanwhile. Returns how
+  // many cells it looked into.
   template <class Visit>
-  std::uint64_t visit_along_x(const Point& from, double to_x, Visit visit) const {
+  std::uint64_t visit_along(const Point& from, const Point& to, Visit visit) const {
     if (levels_.empty()) return 0;
-    const Point to = {to_x, from[1], from[2]};
-    const StepRange box = {steps_of(from), steps_of(to)};
+    const StepRange box = box_of({from, to, to});
     const CellRange range = {cell_of(box.low), cell_of(box.high)};
     std::uint64_t cells = 0;
     const auto visit_cell = [&](const Cell& cell, const Content& content) {
+      if (!is_on(0, cell, from, to)) return;
       ++cells;
       if (content.tree != nullptr) {
         return content.tree->visit_along(content.entries, from, to,
@@ -67,7 +67,9 @@ class TriangleGrid {
         if (BoxInCell::may_meet(reached, entry.box)) visit(entry.triangle);
       }
     };
-    const auto reaches = [](std::size_t, const Cell&) { return true; };
+    const auto reaches = [&](std::size_t level, const Cell& word) {
+      return is_on(level, word, from, to);
+    };
     descend(levels_.size() - 1, {0, 0, 0}, range, reaches, visit_cell);
     return cells;
   }
@@ -199,6 +201,8 @@ class TriangleGrid {
   Content content_at(const Cell& word, std::size_t index, unsigned bit) const;
   // To a cell, or to a word of the level below.
   double squared_distance_to(std::size_t level, const Cell& cell, const Point& point) const;
+  // True if the line between two points may meet such a cell or word.
+  bool is_on(std::size_t level, const Cell& cell, const Point& from, const Point& to) const;
   // A search for one point; remembers triangles that it has looked at, because cells share them.
   struct Search {
     Point point;

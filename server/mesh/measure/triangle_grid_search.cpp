@@ -96,6 +96,19 @@ double TriangleGrid::squared_distance_to(std::size_t level, const Cell& cell,
   return squared;
 }
 
+bool TriangleGrid::is_on(std::size_t level, const Cell& cell, const Point& from,
+                         const Point& to) const {
+  constexpr double kSlack = 1e-9;  // more than rounding can add; of a cell's side
+  const double side = side_mm_ * static_cast<double>(std::uint64_t{1} << 2 * level);
+  Point low;
+  Point high;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = low_[axis] + cell[axis] * side - kSlack * side_mm_;
+    high[axis] = low_[axis] + (cell[axis] + 1.0) * side + kSlack * side_mm_;
+  }
+  return line_meets(low, high, from, to);
+}
+
 TriangleGrid::Content TriangleGrid::content_at(const Cell& word, std::size_t index,
                                                unsigned bit) const {
   const std::uint64_t lower = (std::uint64_t{1} << bit) - 1;

@@ -58,14 +58,13 @@ Matrix principal_axes(const SurfaceView& surface, std::span<const TriangleInCell
 
 }  // namespace
 
-bool TriangleTree::Box::is_on(const Point& from, const Point& to) const {
+bool line_meets(const Point& low, const Point& high, const Point& from, const Point& to) {
   double enter = 0;
   double leave = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto lane = static_cast<int>(axis);
     const double way = to[axis] - from[axis];
-    const double to_low = low[lane] - from[axis];
-    const double to_high = high[lane] - from[axis];
+    const double to_low = low[axis] - from[axis];
+    const double to_high = high[axis] - from[axis];
     if (way == 0) {
       if (to_low > 0 || to_high < 0) return false;
       continue;

@@ -64,6 +64,9 @@ class BoxInCell {
   static constexpr std::uint32_t kSpareBits = 0b10000'10000'10000'10000'10000'10000;
 };
 
+// True if the line between two points meets the box.
+bool line_meets(const Point& low, const Point& high, const Point& from, const Point& to);
+
 // Halves the triangles again and again, so a search looks at few of them even if their edges are
 // much longer in one direction than in another, or if they differ in size. The axes of the boxes
 // follow the edges where these are longest at an angle, so boxes are narrow for any lattice. Takes
@@ -196,7 +199,9 @@ class TriangleTree {
       const Int4 is_apart = (low > other.high) | (other.low > high);
       return (is_apart[0] | is_apart[1] | is_apart[2]) == 0;
     }
-    bool is_on(const Point& from, const Point& to) const;
+    bool is_on(const Point& from, const Point& to) const {
+      return line_meets({low[0], low[1], low[2]}, {high[0], high[1], high[2]}, from, to);
+    }
     float longest_side() const {
       return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
     }

@@ -75,6 +75,16 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
             "  mesh.drc        3.5 MB (3,510,351 B)\n");
 }
 
+TEST(MeshReport, TellsTheThinnestWall) {
+  MeshSummary mesh;
+  EXPECT_THAT(mesh_report(mesh), Not(HasSubstr("thinnest")));
+  mesh.thickness = Thickness{.thinnest_mm = 0.25, .place = {{1, 2, -3}}, .thin_area_mm2 = 12.34};
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("thinnest wall   0.250 mm at 1.00, 2.00, -3.00 mm\n"
+                                           "    too thin      12.3 mm² of the surface\n"));
+  mesh.thickness = Thickness();
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("thinnest wall   none: "));
+}
+
 TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
   MeshSummary mesh;
   mesh.triangles = 7;

@@ -48,7 +48,7 @@ Made made(const test::SampleVolume<T>& volume, double iso, const MeshParameters&
   }
   constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
   const Volume named;
-  const jobs::MeshRequest request = {named, parameters, iso, false, kMemory};
+  const jobs::MeshRequest request = {named, parameters, iso, {}, kMemory};
   const jobs::Report ignore = [](Stage, double, const Timing&) {};
   jobs::Progress progress({}, ignore, {});
   if (parameters.labels) {

@@ -60,11 +60,18 @@ TEST(DistanceCost, IsOfTheExtractedSurfaceAndItsGrid) {
   const mesh::SurfaceSize surface = {2'000'000, 1'000'000};
   MeshParameters parameters;
   parameters.formats = {MeshFormat::kGlb};
-  const std::uint64_t without = estimate_memory(surface, 0, parameters, false);
+  const std::uint64_t without = estimate_memory(surface, 0, parameters, {});
   parameters.distances = true;
-  const std::uint64_t with = estimate_memory(surface, 0, parameters, false);
+  const std::uint64_t with = estimate_memory(surface, 0, parameters, {});
   EXPECT_GT(with, without + surface.triangles * 100);
-  EXPECT_LE(with, estimate_memory(surface, 0, parameters, true));
+  EXPECT_LE(with, estimate_memory(surface, 0, parameters, {.certify = true}));
+  // Thickness needs the grid of the mesh itself.
+  parameters = {};
+  parameters.fill_cavities = true;
+  const std::uint64_t plain = estimate_memory(surface, 0, parameters, {});
+  const std::uint64_t thickness =
+      estimate_memory(surface, 0, parameters, {.min_thickness_mm = 0.4});
+  EXPECT_GT(thickness, plain + surface.triangles * 100);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Jobs whose error is bound or measured, and what they leave out of the surface.
 #include <algorithm>
 #include <cstring>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -215,6 +216,49 @@ TEST_F(ErrorJobsTest, MeasureWithoutChangingAnything) {
   EXPECT_TRUE(certified.quality.self_intersections);
 }
 
+// The shell's wall is 3.9 mm, and the speck's diameter is 2.8 mm.
+TEST_F(ErrorJobsTest, MeasureThicknessWithoutChangingAnything) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.passes = 0;  // which would shrink the speck
+  parameters.regularize = false;
+  const MeshSummary plain = run(parameters);
+  EXPECT_FALSE(plain.thickness);
+  std::vector<Stage> stages;
+  const Report note = [&](Stage stage, double, const Timing&) { stages.push_back(stage); };
+  for (const double below : {2.0, 3.2, 5.0}) {
+    parameters.min_thickness_mm = below;
+    const auto [mesh, timing] = run(volume_, parameters, note);
+    EXPECT_EQ(mesh.files.at(MeshFormat::kDrc).sha256, plain.files.at(MeshFormat::kDrc).sha256);
+    EXPECT_FALSE(mesh.certificate);
+    EXPECT_THAT(stages, testing::Contains(Stage::kThickness));
+    EXPECT_GT(timing.thickness, 0);
+    const Thickness& thickness = mesh.thickness.value();
+    EXPECT_NEAR(thickness.thinnest_mm.value_or(0), 2.8, 0.25);
+    EXPECT_GT(thickness.place.value()[0], 19);
+    const double speck = 4 * std::numbers::pi * 1.4 * 1.4;
+    const double thin = below < 3 ? 0 : below < 4 ? speck : mesh.area_mm2;
+    EXPECT_NEAR(thickness.thin_area_mm2, thin, 0.07 * thin);
+  }
+}
+
+// Each label has its own walls, and one between two labels belongs to both.
+TEST_F(ErrorJobsTest, MeasureTheThicknessOfEachLabel) {
+  const Volume labels =
+      add(test::sample<std::uint8_t>([](const test::Point& p) { return p[2] < 12 ? 1.0 : 2.0; },
+                                     {16, 16, 16}),
+          SampleType::kUint8);
+  JobParameters parameters = label_parameters({});
+  parameters.volume = labels.id;
+  parameters.close = true;
+  parameters.passes = 0;
+  parameters.formats = {MeshFormat::kStl};
+  parameters.min_thickness_mm = 5;
+  const Thickness thickness = run(labels, parameters).mesh.thickness.value();
+  EXPECT_NEAR(thickness.thinnest_mm.value_or(0), 4, 0.2);
+  EXPECT_GT(thickness.place.value()[2], 11.4);
+  EXPECT_NEAR(thickness.thin_area_mm2, 2 * 16 * 16, 60);  // without bevelled edges
+}
+
 // All files that round nothing hold the mesh, so they have its certificate, under the first's name.
 TEST_F(ErrorJobsTest, MeasureTheMeshOnceForAllFilesThatHoldIt) {
   JobParameters parameters = parameters_of(volume_, 0);
@@ -380,7 +424,8 @@ TEST_F(ErrorJobsTest, AreCancelledAndRefusedAsOthersAre) {
   JobParameters parameters = parameters_of(volume_, 0);
   parameters.max_error_mm = 0.1;
   parameters.certify = true;
-  for (const Stage at : {Stage::kSimplify, Stage::kCertify}) {
+  parameters.min_thickness_mm = 0.4;
+  for (const Stage at : {Stage::kSimplify, Stage::kCertify, Stage::kThickness}) {
     std::stop_source stop;
     const Report stop_there = [&](Stage stage, double, const Timing&) {
       if (stage == at) stop.request_stop();

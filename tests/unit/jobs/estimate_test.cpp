@@ -55,7 +55,7 @@ TEST(CheckDisk, RejectsFilesThatCanNeverFit) {
       check_disk(surface, {.volume = volume,
                            .parameters = parameters,
                            .iso = 0,
-                           .certify = false,
+                           .measures = {},
                            .memory_bytes = 0,
                            .disk_bytes = disk_bytes});
     });
@@ -316,6 +316,7 @@ TEST(ExpectedTime, GrowsWithTheVolumeAndWithWhatIsAsked) {
   };
   EXPECT_GT(with([](JobParameters& all) { all.passes = 100; }), least);
   EXPECT_GT(with([](JobParameters& all) { all.certify = true; }), least);
+  EXPECT_GT(with([](JobParameters& all) { all.min_thickness_mm = 0.4; }), least);
   EXPECT_GT(with([](JobParameters& all) { all.max_error_mm = 0.1; }), least);
   EXPECT_LT(with([](JobParameters& all) { all.crop = {{{0, 0, 0}, {10, 10, 10}}}; }), least);
   const double all_of_it = with([](JobParameters& all) {
@@ -332,8 +333,8 @@ TEST(ExpectedTime, GrowsALittleWithUnevenSpacing) {
   volume.dims = {100, 100, 100};
   const auto certify_ms = [&](double spacing_mm) {
     volume.geometry.spacing = {spacing_mm, 0.5, 0.5};
-    const Timing times = expected_times(volume, {}, true);
-    EXPECT_EQ(times.extract, expected_times(volume, {}, false).extract);
+    const Timing times = expected_times(volume, {}, {.certify = true});
+    EXPECT_EQ(times.extract, expected_times(volume, {}, {}).extract);
     return times.certify;
   };
   const double even = certify_ms(0.5);
@@ -350,7 +351,7 @@ TEST(Progress, AStageHasItsShareOfTheExpectedTime) {
   volume.dims = {100, 100, 100};
   JobParameters parameters;
   parameters.certify = true;
-  const Timing expected = expected_times(volume, parameters, parameters.certify);
+  const Timing expected = expected_times(volume, parameters, parameters);
   double done = 0;
   const Report report = [&](Stage, double share, const Timing&) { done = share; };
   Progress progress({}, report, expected);

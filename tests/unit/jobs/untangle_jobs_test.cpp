@@ -166,13 +166,13 @@ TEST_F(UntangleJobs, TellTheStageAndCanBeCancelledInIt) {
 TEST(UntangleCost, IsOfTheExtractedPositionsAndOneGrid) {
   const mesh::SurfaceSize surface = {2'000'000, 1'000'000};
   MeshParameters parameters;
-  const std::uint64_t without = estimate_memory(surface, 0, parameters, false);
+  const std::uint64_t without = estimate_memory(surface, 0, parameters, {});
   parameters.untangle = true;
-  const std::uint64_t with = estimate_memory(surface, 0, parameters, false);
+  const std::uint64_t with = estimate_memory(surface, 0, parameters, {});
   EXPECT_GE(with, without + surface.triangles * 100 + surface.vertices * sizeof(mesh::Vec3));
   EXPECT_LE(with, without + surface.triangles * 140);
-  EXPECT_LE(with, estimate_memory(surface, 0, parameters, true));
-  const Timing times = stage_times(surface, surface, {}, parameters, false);
+  EXPECT_LE(with, estimate_memory(surface, 0, parameters, {.certify = true}));
+  const Timing times = stage_times(surface, surface, {}, parameters, {});
   EXPECT_GT(times.untangle, 1000);
 }
 

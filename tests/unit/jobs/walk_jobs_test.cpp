@@ -47,10 +47,10 @@ TEST_F(WalkJobs, WriteAndTellWhatIsMadeOfTheWholeSurface) {
   ways[5].normals = false;
   for (JobParameters& way : ways) {
     way.formats = {MeshFormat::kStl, MeshFormat::kGlb};
-    ASSERT_TRUE(can_be_walked(way, false));
+    ASSERT_TRUE(can_be_walked(way, {}));
     const MeshSummary walked = run(volume, way).mesh;
     way.formats.push_back(MeshFormat::kOff);
-    ASSERT_FALSE(can_be_walked(way, false));
+    ASSERT_FALSE(can_be_walked(way, {}));
     const MeshSummary whole = run(volume, way).mesh;
     for (const MeshFormat format : {MeshFormat::kStl, MeshFormat::kGlb}) {
       EXPECT_EQ(walked.files.at(format).sha256, whole.files.at(format).sha256);
@@ -62,12 +62,13 @@ TEST_F(WalkJobs, WriteAndTellWhatIsMadeOfTheWholeSurface) {
 TEST(CanBeWalked, OnlyWithoutWhatNeedsTheWholeSurface) {
   MeshParameters parameters;
   parameters.formats = {MeshFormat::kStl};
-  EXPECT_TRUE(can_be_walked(parameters, false));
-  EXPECT_FALSE(can_be_walked(parameters, true));
+  EXPECT_TRUE(can_be_walked(parameters, {}));
+  EXPECT_FALSE(can_be_walked(parameters, {.certify = true}));
+  EXPECT_FALSE(can_be_walked(parameters, {.min_thickness_mm = 0.4}));
   const auto with = [&](auto change) {
     MeshParameters changed = parameters;
     change(changed);
-    return can_be_walked(changed, false);
+    return can_be_walked(changed, {});
   };
   EXPECT_FALSE(with([](MeshParameters& p) { p.formats = {MeshFormat::kDrc}; }));
   const auto as_glb = [&](auto change) {
@@ -98,13 +99,13 @@ TEST(IsWalked, UnlessASmallSurfaceHasTooFewWindowsForTheThreads) {
     for (const int threads : {1, 2, 64}) {
       const test::ThreadCount several(threads);
       const bool is_few = format == MeshFormat::kGlb && threads > 1;
-      EXPECT_EQ(is_walked(small, parameters, false), !is_few);
-      EXPECT_TRUE(is_walked(large, parameters, false));
-      EXPECT_FALSE(is_walked(large, parameters, true));
+      EXPECT_EQ(is_walked(small, parameters, {}), !is_few);
+      EXPECT_TRUE(is_walked(large, parameters, {}));
+      EXPECT_FALSE(is_walked(large, parameters, {.certify = true}));
       MeshParameters plain = parameters;
       plain.glb_codec = GlbCodec::kNone;
-      EXPECT_EQ(is_walked(small, plain, false), format == MeshFormat::kStl);
-      EXPECT_TRUE(is_walked(large, plain, false));
+      EXPECT_EQ(is_walked(small, plain, {}), format == MeshFormat::kStl);
+      EXPECT_TRUE(is_walked(large, plain, {}));
     }
   }
 }
@@ -115,10 +116,10 @@ TEST(EstimateMemory, FollowsTheLayerOfAWalk) {
   const mesh::SurfaceSize surface = test::even_surface(1024, 30'000, 60'000);
   const mesh::SurfaceSize twice = test::even_surface(2048, 30'000, 60'000);
   const std::uint64_t samples = std::uint64_t{1} << 30;
-  const std::uint64_t needed = estimate_memory(surface, samples, parameters, false);
+  const std::uint64_t needed = estimate_memory(surface, samples, parameters, {});
   EXPECT_LT(needed, std::uint64_t{700} << 20);
-  EXPECT_LT(estimate_memory(twice, 2 * samples, parameters, false), needed * 21 / 20);
-  EXPECT_GT(estimate_memory(surface, samples, parameters, true), 3 * needed);
+  EXPECT_LT(estimate_memory(twice, 2 * samples, parameters, {}), needed * 21 / 20);
+  EXPECT_GT(estimate_memory(surface, samples, parameters, {.certify = true}), 3 * needed);
 }
 
 TEST(SpoolFile, GivesBackWhatItTook) {

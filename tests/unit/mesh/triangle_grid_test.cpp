@@ -90,7 +90,7 @@ Cost cost_of(const SurfaceView& surface, const SurfaceView& beside) {
   for (const Vec3& position : surface.positions) end_x = std::max(end_x, position[0]);
   for (std::size_t n = 0; n < kLines; ++n) {
     const Point from = measured_point(surface, n * (surface.positions.size() / kLines));
-    grid.visit_along_x(from, end_x, [&](std::uint32_t) { ++met; });
+    grid.visit_along(from, {end_x, from[1], from[2]}, [&](std::uint32_t) { ++met; });
   }
   return {found.steps, static_cast<double>(pairs) / triangles,
           static_cast<double>(size.tested_cells) / triangles,

@@ -111,6 +111,7 @@ JobParameters some_parameters() {
            .formats = {MeshFormat::kStl, MeshFormat::kDrc},
            .draco = {.position_bits = 30, .speed = 0},
            .normals = true},
+          {},
           "0123abcd",
           Priority::kStat};
 }

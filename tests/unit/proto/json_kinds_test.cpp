@@ -88,7 +88,9 @@ Job certified_job() {
   job.parameters.distances = true;
   job.parameters.components.nearest_to = {{1, 2, 3}, {4, 5, 6}};
   job.parameters.certify = true;
+  job.parameters.min_thickness_mm = 0.4;
   job.parameters.untangle = true;
+  job.timing.thickness = 3;
   job.timing.untangle = 12;
   MeshSummary& mesh = *job.mesh;
   mesh.iso = 61.5;
@@ -97,6 +99,7 @@ Job certified_job() {
   mesh.untangled = {.pairs = 4, .vertices = 9, .left = 1};
   mesh.quality.encloses_volume = true;
   mesh.quality.self_intersections = {.pairs = 3, .triangles = 5, .places = {{1, 2, 3}}};
+  mesh.thickness = {.thinnest_mm = 0.3, .place = {{1, 2, 3}}, .thin_area_mm2 = 12};
   mesh.certificate.emplace();
   mesh.certificate->file = MeshFormat::k3mf;
   mesh.certificate->found_mm = 0.09;
@@ -126,11 +129,11 @@ TEST(JobJson, MayLackTimesOfStagesThatAreNotAlwaysRun) {
 TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {
   const json job = json::parse(to_json(succeeded_job()));
   for (const char* const name : {"max_error_mm", "triangles", "lods", "crop", "fill_cavities",
-                                 "distances", "certify", "untangle"}) {
+                                 "distances", "certify", "min_thickness_mm", "untangle"}) {
     EXPECT_FALSE(job["parameters"].contains(name)) << name;
   }
   EXPECT_FALSE(job["parameters"]["components"].contains("nearest_to"));
-  for (const char* const name : {"iso", "untangled", "simplified", "certificate"}) {
+  for (const char* const name : {"iso", "untangled", "simplified", "certificate", "thickness"}) {
     EXPECT_FALSE(job["mesh"].contains(name)) << name;
   }
   EXPECT_FALSE(job["mesh"]["quality"].contains("self_intersections"));

@@ -140,6 +140,7 @@ TEST(JobBody, TakesEveryMember) {
                                   .formats = {MeshFormat::kStl, MeshFormat::kGlb},
                                   .draco = {.position_bits = 11, .speed = 3},
                                   .normals = true},
+                                 {},
                                  "abc",
                                  Priority::kBulk};
   EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,

@@ -108,6 +108,9 @@ TEST(ResultKey, KnowsSamplesParametersAndVersionAlone) {
   parameters.normals = !parameters.normals;
   EXPECT_NE(key("1"), first);
   parameters.normals = !parameters.normals;
+  parameters.min_thickness_mm = 0.4;
+  EXPECT_NE(key("1"), first);
+  parameters.min_thickness_mm = {};
   volume.samples = "abd";
   EXPECT_NE(key("1"), first);
   volume.samples = "abc";

@@ -25,8 +25,8 @@ std::string made(const SampleVolume<float>& volume, const MeshParameters& parame
   const jobs::SampleArray whole = {record.type, record.dims, record.geometry,
                                    reinterpret_cast<const std::byte*>(volume.samples.data())};
   const jobs::CroppedSamples cropped(whole, parameters);
-  const jobs::MeshRequest request = {record, parameters, parameters.iso.value(), true,
-                                     std::uint64_t{4} << 30};
+  const jobs::MeshRequest request = {
+      record, parameters, parameters.iso.value(), {.certify = true}, std::uint64_t{4} << 30};
   std::string file;
   const codec::Sink sink = [&](std::span<const std::byte> bytes) {
     file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());

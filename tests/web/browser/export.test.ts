@@ -26,7 +26,7 @@ describe('a surface', () => {
     await expect.poll(() => page.locator('[data-format=stl]').count()).toBe(1);
     await expect.poll(() => page.getByRole('button', { name: 'For 3D printing' }).count()).toBe(0);
     const made = await madeJob(at);
-    expect(made.parameters).toMatchObject({ close: true, certify: true, fill_cavities: true, smoothing: 'taubin', max_error_mm: 0.2, components: { keep: 1 } });
+    expect(made.parameters).toMatchObject({ close: true, certify: true, min_thickness_mm: 0.4, fill_cavities: true, smoothing: 'taubin', max_error_mm: 0.2, components: { keep: 1 } });
     const { name, bytes } = await saved(page, /^Certificate$/);
     expect(name).toMatch(/-certificate\.json$/);
     const told = JSON.parse(bytes.toString()) as { certificate: { found_mm: number }; files: Record<string, { sha256: string }> };
@@ -45,22 +45,27 @@ describe('a surface', () => {
     expect(made.mesh?.components).toBe(1);
     expect(made.mesh?.certificate).toMatchObject({ proven: true });
     expect(await page.locator('.print-check [data-state=bad]').count()).toBe(0);
-    expect(await page.locator('.print-check [data-state=good]').count()).toBe(4);
+    expect(await page.locator('.print-check [data-state=good]').count()).toBe(5);
     const text = await page.locator('.print-check').innerText();
     expect(text).toMatch(/One connected component/);
     expect(text).toMatch(/Nowhere more than 0\.\d+ mm from the scan. This is proven/);
+    expect(text).toMatch(/Thinnest wall: [\d.]+ mm at .*, no less than the nozzle's 0\.4 mm/);
     expect(text).toMatch(/STL [\d.]+ KB/);
     expect(text).not.toMatch(/max_error_mm|certif/i);
   });
 
   it('for printing that is not ready names what is wrong, shows where, and offers what helps', async ({ page, daemon }) => {
     const volume = await daemon.upload(noiseNrrd(20));
-    const { id, mesh } = await daemon.make({ volume, iso: 128, passes: 60, certify: true, formats: ['glb', 'stl', '3mf'] });
+    const { id, mesh } = await daemon.make({ volume, iso: 128, passes: 60, certify: true, min_thickness_mm: 0.9, formats: ['glb', 'stl', '3mf'] });
     expect(mesh?.components).toBeGreaterThan(1);
     await openSurface(at, id);
     const bad = page.locator('.print-check [data-state=bad]');
-    await expect.poll(() => bad.count()).toBe(3);
-    expect(await page.locator('.print-check').innerText()).toMatch(/Open at .* edges/);
+    await expect.poll(() => bad.count()).toBe(4);
+    const text = await page.locator('.print-check').innerText();
+    expect(text).toMatch(/Open at .* edges/);
+    expect(text).toMatch(/Thinnest wall: [\d.]+ mm at .* \(below the nozzle's 0\.9 mm: [\d.]+ mm\u00b2\)/);
+    await bad.getByRole('button', { name: 'Show it' }).click();
+    await expect.poll(() => page.locator('.pane').getAttribute('data-marks')).toBe('1');
     await bad.getByRole('button', { name: 'Show them' }).click();
     await expect.poll(() => page.locator('.pane').getAttribute('data-marks')).toMatch(/^[1-9]/);
     const red = async (): Promise<number> => {

@@ -37,12 +37,12 @@ def mesh(
     iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
     label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
     label_values: api.LabelValues = OMITTED, scheme: api.Scheme = OMITTED,
-    interpolation: api.Interpolation = OMITTED, regularize: api.Regularize = OMITTED,
-    passes: api.Passes = OMITTED, smoothing: api.Smoothing = OMITTED, lambda_: api.Lambda = OMITTED,
-    pass_band: api.PassBand = OMITTED, max_displacement_mm: api.MaxDisplacement = OMITTED,
-    untangle: api.Untangle = OMITTED, close: api.Close = OMITTED,
-    components: api.JobParametersComponents = OMITTED, fill_cavities: api.FillCavities = OMITTED,
-    crop: api.Crop = OMITTED, max_error_mm: api.MaxError = OMITTED, triangles: api.Triangles = OMITTED,
+    interpolation: api.Interpolation = OMITTED, regularize: api.Regularize = OMITTED, passes: api.Passes = OMITTED,
+    smoothing: api.Smoothing = OMITTED, lambda_: api.Lambda = OMITTED, pass_band: api.PassBand = OMITTED,
+    max_displacement_mm: api.MaxDisplacement = OMITTED, untangle: api.Untangle = OMITTED,
+    close: api.Close = OMITTED, components: api.JobParametersComponents = OMITTED,
+    fill_cavities: api.FillCavities = OMITTED, crop: api.Crop = OMITTED, max_error_mm: api.MaxError = OMITTED,
+    triangles: api.Triangles = OMITTED,
     # End of the parameters.
 ) -> Mesh:
     """Makes a mesh of an array in this process: `isomesh_kernels.mesh(scan, affine=image.affine, iso=60)`.

@@ -307,6 +307,7 @@ GlbCodec = Literal['draco', 'none', 'meshopt', 'khr-meshopt', 'quantized']
 Space = Literal['lps', 'ras']
 Priority = Literal['stat', 'routine', 'bulk']
 Certify = bool
+MinThickness = Union['Optional[float]']
 
 
 class JobParametersComponents(TypedDict):
@@ -358,6 +359,7 @@ class _Parameters(TypedDict, total=False):
     space: Space
     priority: Priority
     certify: Certify
+    min_thickness_mm: MinThickness
     callback: Callback
 
 
@@ -538,6 +540,11 @@ class JobOptions(_Parameters, total=False):
         Measure how far the files are from the extracted surface, and where they intersect
         themselves.
 
+    min_thickness_mm
+        Measure how thick walls are, and the area of those that are thinner than this, such as
+        the width of a printer's nozzle. In millimetres. It changes no file: nothing is made
+        thicker. mesh.thickness has the result.
+
     callback
         Receives a POST with the job when the job ends, whatever the result. The body is that of
         GET. Only addresses that the operator has listed are called. The request is signed as in
@@ -608,7 +615,7 @@ class JobReport(TypedDict):
 
 
 #: The current stage of a job, or its last one.
-Stage = Literal['queue', 'load', 'extract', 'smooth', 'untangle', 'simplify', 'encode', 'certify', 'done']
+Stage = Literal['queue', 'load', 'extract', 'smooth', 'untangle', 'simplify', 'encode', 'certify', 'thickness', 'done']
 
 
 class Timing(TypedDict):
@@ -630,6 +637,8 @@ class Timing(TypedDict):
     encode: float
     #: Measuring the error, if requested.
     certify: float
+    #: Measuring the thickness of walls, if requested.
+    thickness: float
     #: From acceptance to end.
     total: float
 
@@ -723,6 +732,25 @@ class MeshSummary(TypedDict):
     #: /v1/jobs/{id}/walls lists them. A job of an older server does not have it.
     walls_count: NotRequired[int]
     certificate: NotRequired[MeshCertificate]
+    thickness: NotRequired[Thickness]
+
+
+class Thickness(TypedDict):
+    """How thick the walls are. Only for a job with min_thickness_mm. The thickness at a point
+    of the surface is the way from it through the material, against the normal of its triangle,
+    to the opposite side: the first triangle there, if it faces away within about 60 degrees. An
+    edge is no wall: nearer than min_thickness_mm to where both sides meet, there is no
+    thickness. The gap between two bodies is no wall. It is measured at the centres of all
+    triangles, and of the parts into which large ones are divided, in the mesh before files
+    round its coordinates. Of labels, in each label's own surface."""
+
+    #: The least thickness. null if no point has an opposite side, for example in an open sheet.
+    thinnest_mm: Optional[float]
+    #: A point of the surface with that thickness, in LPS millimetres.
+    place: Optional[Vector]
+    #: The area of the surface where its wall is thinner than min_thickness_mm. A thin wall has two
+    #: sides.
+    thin_area_mm2: float
 
 
 class MeshCertificateBudgetMm(TypedDict):

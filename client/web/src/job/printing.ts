@@ -6,6 +6,8 @@ import { applies, parameterOf } from './table';
 const printers: readonly string[] = ['stl', '3mf'];
 // In millimetres: about a layer of a printer, beyond which nobody sees the difference.
 const layer = 0.2;
+// The width of the usual nozzle: printers leave out walls that are thinner.
+export const nozzle = 0.4;
 
 // The largest error of a print: half a voxel, but no more than a layer.
 export function printingError(spacing: readonly number[]): number {
@@ -18,6 +20,7 @@ export function forPrinting(job: JobParameters, spacing: readonly number[]): Job
   const changes: Partial<JobParameters> = {
     close: true,
     certify: true,
+    min_thickness_mm: job.min_thickness_mm ?? nozzle,
     max_error_mm: job.max_error_mm ?? printingError(spacing),
     formats: withGlb([...job.formats, 'stl', '3mf']),
     components: { ...job.components, keep: job.components?.keep ?? 1 },
@@ -32,6 +35,7 @@ export function notForPrinting(job: JobParameters, spacing: readonly number[]): 
   const changes: Partial<JobParameters> = {
     close: false,
     certify: false,
+    ...(job.min_thickness_mm === nozzle && { min_thickness_mm: null }),
     formats: withGlb(job.formats.filter((format) => !printers.includes(format))),
     fill_cavities: false,
     ...(job.components?.keep === 1 && { components: { ...job.components, keep: null } }),
@@ -60,8 +64,8 @@ export function isForPrinting({ parameters, mesh }: Job): boolean {
 // The measurements, the files and the parameters, to keep with a print.
 export function certificateFile(job: Job): string {
   const { parameters, mesh, finished, id } = job;
-  const { certificate, quality, volume_mm3: volume, area_mm2: area, triangles: count, files } = mesh ?? {};
+  const { certificate, thickness, quality, volume_mm3: volume, area_mm2: area, triangles: count, files } = mesh ?? {};
   const sums = Object.fromEntries(Object.entries(files ?? {}).map(([format, { bytes, sha256 }]) => [format, { bytes, sha256 }]));
-  const told = { job: id, finished, parameters, triangles: count, volume_mm3: volume, area_mm2: area, certificate, quality, files: sums };
+  const told = { job: id, finished, parameters, triangles: count, volume_mm3: volume, area_mm2: area, certificate, thickness, quality, files: sums };
   return `${JSON.stringify(told, null, 2)}\n`;
 }

@@ -120,6 +120,13 @@ export function intersectionsText({ quality }: MeshSummary): Child {
   return h('span.attention', { title: `These triangles intersect.${at}` }, pairsText(found.pairs));
 }
 
+// '' unless the job measured walls.
+export function thinnestText({ thickness }: Pick<MeshSummary, 'thickness'>): string {
+  if (!thickness) return '';
+  const { place, thinnest_mm: thinnest } = thickness;
+  return place && thinnest !== null ? `${millimetres(thinnest)} mm at ${place.map(formatSize).join(', ')}` : 'none';
+}
+
 // The reason why a surface encloses no volume.
 export function noVolumeText({ closed }: { closed: boolean }): string {
   return closed ? 'none: the triangles disagree about which side is outside' : 'none: the surface is open';

@@ -26,7 +26,7 @@ import { cameraNote } from '../surface/view_tools';
 // The stages of this job.
 function stagesOf({ parameters }: Job): string[] {
   const isSimplified = (parameters.max_error_mm ?? parameters.triangles ?? null) !== null;
-  const isLeftOut: Partial<Record<string, boolean>> = { smooth: parameters.passes === 0, untangle: !parameters.untangle, simplify: !isSimplified, certify: !parameters.certify };
+  const isLeftOut: Partial<Record<string, boolean>> = { smooth: parameters.passes === 0, untangle: !parameters.untangle, simplify: !isSimplified, certify: !parameters.certify, thickness: (parameters.min_thickness_mm ?? null) === null };
   return stages.filter((name) => !isLeftOut[name]);
 }
 

@@ -13,7 +13,7 @@ import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
 import { exportActions } from './export_section';
-import { certificateBody, intersectionsText, openText, untangledText } from './certificate';
+import { certificateBody, intersectionsText, openText, thinnestText, untangledText } from './certificate';
 import { distributionChart, stepsOf, totalOf, waterfall, type Durations } from './charts';
 
 export function section(title: string, ...children: Child[]): HTMLElement {
@@ -93,6 +93,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
     ['Extent', `${extent} mm`],
     ['Untangled', untangledText(mesh)],
     ['Self-intersections', intersectionsText(mesh)],
+    ['Thinnest wall', thinnestText(mesh)],
     ['Moved by smoothing', job.parameters.passes > 0 ? `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm` : ''],
   ];
   if (mesh.dropped.components > 0) {

@@ -1,8 +1,9 @@
 // A list of what to know before a surface is printed, in plain words, and of what helps where it is not ready.
 import type { Job, Vec3 } from '../../api/types';
-import { isForPrinter } from '../../job/printing';
+import { isForPrinter, nozzle } from '../../job/printing';
 import { isByLabels } from '../../job/table';
 import { makeVariant } from '../../job/variants';
+import { thinnestText } from './certificate';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNumber, formatSize, meshFormatTitle, millimetres } from '../../ui/format';
 
@@ -55,6 +56,16 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
         : point('told', `Up to ${millimetres(found)} mm from the scan, as measured at points. This is not proven.`),
     );
   }
+  const { thickness } = mesh;
+  const width = parameters.min_thickness_mm ?? nozzle;
+  if (!thickness) {
+    points.push(point('told', 'Thin walls are not measured. ', remedy('Measure them', 'Starts a job that finds walls below the width of your nozzle', { min_thickness_mm: width })));
+  } else {
+    const { place, thinnest_mm: thinnest, thin_area_mm2: area } = thickness;
+    const isThin = thinnest !== null && thinnest < width;
+    const than = isThin ? ` (below the nozzle's ${formatNumber(width, 3)} mm: ${formatSize(area)} mm\u00b2). ` : `, no less than the nozzle's ${formatNumber(width, 3)} mm. `;
+    points.push(point(isThin ? 'bad' : 'good', `Thinnest wall: ${thinnestText(mesh)}`, than, place && button('Show it', () => show([place]), { class: 'link', title: 'Marks it on the surface' })));
+  }
   const [low, high] = mesh.bounds;
   const size = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');
   const material = mesh.quality.encloses_volume ? `, ${formatNumber(mesh.volume_mm3.smoothed / 1000, 2)} cm\u00b3 if it is filled` : '';
@@ -64,6 +75,5 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
     return file ? [`${meshFormatTitle(format)} ${formatBytes(file.bytes)}`] : [];
   });
   points.push(point('told', `${files.join(', ')}; ${formatCount(mesh.triangles)} triangles.`));
-  points.push(point('told', 'Thin walls are not measured. Look for walls below the width of your nozzle in the program of your printer.'));
   return h('ul.print-check', ...points);
 }
