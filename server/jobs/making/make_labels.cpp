@@ -196,11 +196,7 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
                provenance_of(samples, written), files.sinks(), progress, summary);
   }
   certify_stage(written, extracted, files, progress, walls.mesh, summary);
-  mesh::Mesh one;
-  const auto label = [&](std::size_t n) -> const mesh::Mesh& {
-    extract_label(walls, triangles, n + 1, one);
-    return one;
-  };
+  const auto label = [&](std::size_t n) -> const mesh::Mesh& { return surfaces[n].mesh; };
   thickness_stage(request, labels.size(), label, progress, summary);
   return made;
 }

@@ -86,11 +86,11 @@ Memory memory_of(const std::vector<std::uint8_t>& samples, const MeshParameters&
   MeshRequest request = {.volume = volume,
                          .parameters = parameters,
                          .iso = 128,
-                         .certify = false,
+                         .measures = {},
                          .memory_bytes = std::uint64_t{1} << 40};
   const mesh::SurfaceSize surface = count_surface(array, request, {}).size;
-  EXPECT_TRUE(sets_aside(samples.size()) && is_walked(surface, parameters, false));
-  Memory memory = {.estimated = estimate_memory(surface, samples.size(), parameters, false)};
+  EXPECT_TRUE(sets_aside(samples.size()) && is_walked(surface, parameters, {}));
+  Memory memory = {.estimated = estimate_memory(surface, samples.size(), parameters, {})};
   Peak peak;
   WatchedSpool spool(folder.path(), peak);
   request.spool = &spool;
