@@ -43,9 +43,11 @@ std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t sampl
   if (!is_set_aside) writing.vertex_bytes = 0;
   const std::uint64_t joined = parameters.regularize && !is_set_aside ? surface.vertices : 0;
   const mesh::WalkOptions options = walk_options(smooth_options(parameters), parameters, surface);
-  const std::uint64_t needed =
-      mesh::walking_memory(options, surface, writing) + files + joined * kJoinedPerVertex +
-      static_cast<std::uint64_t>(mesh::thread_count()) * mesh::WindowTopology::bytes(surface);
+  const std::uint64_t topology =
+      static_cast<std::uint64_t>(mesh::thread_count()) *
+      mesh::WindowTopology::bytes(surface.most_vertices(mesh::kLayersPerPart));
+  const std::uint64_t needed = mesh::walking_memory(options, surface, writing) + files +
+                               joined * kJoinedPerVertex + topology;
   return needed + needed / kHoles;
 }
 

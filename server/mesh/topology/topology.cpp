@@ -14,9 +14,6 @@
 namespace isomesh::mesh {
 namespace {
 
-// Larger slabs look at fewer layers twice; the lists of smaller ones fit into the cache.
-constexpr std::size_t kLayersPerPart = 4;
-
 // The corners of every vertex of a run of layers, which only triangles of the same layers and of
 // the one below name. Those of vertex v are [ends[v - 1], ends[v]).
 class CornerLists {
@@ -140,10 +137,10 @@ WindowTopology::WindowTopology(const Mesh& window, std::span<const Triangle> bel
   behind = of_layer(window.layers() - 1);
 }
 
-std::uint64_t WindowTopology::bytes(const SurfaceSize& surface) {
+std::uint64_t WindowTopology::bytes(std::uint64_t vertices) {
   // Six triangles, and the end of their list.
   constexpr std::uint64_t kPerVertex = 6 * sizeof(Corner) + sizeof(std::uint32_t);
-  return block_bytes(surface.most_vertices(kLayersPerPart) * kPerVertex);
+  return block_bytes(vertices * kPerVertex);
 }
 
 // The layer behind a window is the first of the next: each of its vertices joins two components
