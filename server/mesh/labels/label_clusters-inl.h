@@ -115,12 +115,12 @@ class LabelClusters {
     const auto lose = [&](const StarPoint& point) {
       ++(point.is_below ? loss.vertices_below : loss.vertices);
     };
-    for (Directions rest = joined; rest != 0; rest &= rest - 1) lose(all.edges[first_of(rest)]);
-    visit_joined(all.faces, joined, [&](std::size_t n, const StarPoint& point) {
+    for (Directions rest = joined; rest != 0; rest &= rest - 1) lose(all[0][first_of(rest)]);
+    visit_joined(all[1], joined, [&](std::size_t n, const StarPoint& point) {
       points.faces |= std::uint64_t{1} << n;
       lose(point);
     });
-    visit_joined(all.centres, joined, [&](std::size_t n, const StarPoint& point) {
+    visit_joined(all[2], joined, [&](std::size_t n, const StarPoint& point) {
       points.centres |= std::uint64_t{1} << n;
       lose(point);
     });
@@ -205,7 +205,7 @@ class LabelClusters {
   // The tetrahedra in whose other corners, all in the set, three labels are.
   std::size_t corners(unsigned parity, Directions set) const {
     std::size_t count = 0;
-    visit_joined(points_[parity].centres, set, [&](std::size_t, const StarPoint&) { ++count; });
+    visit_joined(points_[parity][2], set, [&](std::size_t, const StarPoint&) { ++count; });
     return count;
   }
 

@@ -18,26 +18,22 @@ class PointFinder {
         cases_{make_wall_cases(scheme, false, false), make_wall_cases(scheme, true, false)} {}
 
   StarPoints around(unsigned parity) const {
-    StarPoints points;
-    points.edges.resize(links_.directions().size());
-    std::set<Directions> edges;
-    std::set<Directions> faces;
-    std::set<Directions> centres;
+    std::array<std::set<Directions>, 3> found;  // by the number of neighbours less one
     for (const auto& triangles : {links_.above(parity), links_.below(parity)}) {
       for (const Directions all : triangles) {
-        centres.insert(all);
-        for (Directions rest = all; rest != 0; rest &= rest - 1) {
-          const Directions one = rest & (~rest + 1);
-          edges.insert(one);
-          faces.insert(all & ~one);
+        for (Directions some = all; some != 0; some = (some - 1) & all) {
+          found[static_cast<std::size_t>(std::popcount(some)) - 1].insert(some);
         }
       }
     }
-    for (const Directions edge : edges) {
-      points.edges[static_cast<std::size_t>(std::countr_zero(edge))] = point(edge, parity);
+    StarPoints points;
+    points[0].resize(links_.directions().size());
+    for (const Directions edge : found[0]) {
+      points[0][static_cast<std::size_t>(std::countr_zero(edge))] = point(edge, parity);
     }
-    for (const Directions face : faces) points.faces.push_back(point(face, parity));
-    for (const Directions centre : centres) points.centres.push_back(point(centre, parity));
+    for (std::size_t kind = 1; kind < points.size(); ++kind) {
+      for (const Directions set : found[kind]) points[kind].push_back(point(set, parity));
+    }
     return points;
   }
 
@@ -58,8 +54,7 @@ class PointFinder {
     for (const std::uint8_t d : std::span(point.members).first(count)) {
       corners |= 1U << corner_from(low, links_.directions()[d].step);
     }
-    const unsigned owner = (parity + static_cast<unsigned>(std::popcount(point.corner))) & 1;
-    const auto& slots = cases_[owner].slots;
+    const auto& slots = cases_[point.owner_parity(parity)].slots;
     const auto found = std::ranges::find_if(slots, [&](const Slot& slot) {
       unsigned set = 0;
       for (std::size_t i = 0; i < slot.size; ++i) set |= 1U << slot.corners[i];
