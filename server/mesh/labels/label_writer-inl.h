@@ -40,8 +40,8 @@ struct WrittenRow {
   const std::uint32_t* joined;  // for each sample the set of its slots that are some cluster's
 };
 
-// Writes the triangles of the cells of one row, and what is on their sides. Leaves triangles out of
-// which two corners are one vertex.
+// Writes the triangles of the cells of one row, and what is on their sides. Where there are
+// clusters, it leaves triangles out of which two corners are one vertex.
 class LabelCellWriter {
  public:
   LabelCellWriter(const Separation& separation, const LabelRow& row, const EdgeOffsets& offsets,
@@ -60,7 +60,9 @@ class LabelCellWriter {
     if ((cells.several >> bit & 1) != 0) return write_several(x, places, out);
     const unsigned inside = cells.cases[bit];
     const CellCase& cell = separation_.splits[row_.parity_at(x)].cases[inside];
-    Triangle* const end = write_kept(cell, places, offsets_, end_, out);
+    Triangle* const end = separation_.clusters.empty()
+                              ? write_case(cell, places, offsets_, out)
+                              : write_kept(cell, places, offsets_, end_, out);
     const WallSides sides = {row_.label(static_cast<unsigned>(std::countr_one(inside)), x),
                              row_.label(static_cast<unsigned>(std::countr_zero(inside)), x)};
     std::fill(sides_ + (out - triangles_), sides_ + (end - triangles_), sides);
