@@ -27,7 +27,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <utility>
 
 #include <hwy/highway.h>
 
@@ -63,7 +65,8 @@ class LabelClusters {
     out.any = 0;
     const LabelRow row = field_.row(y, z);
     if (!row.may_cross(w)) return {};
-    const std::array<Word, 8> crossed = row.crossed_edges(w);
+    std::array<Word, 8> crossed;
+    const WordCount count = row.count(w, crossed);
     for (const Word all : crossed) out.any |= all;
     for (unsigned direction = 1; direction < 8; ++direction) {
       const Word all = crossed[direction];
@@ -71,7 +74,7 @@ class LabelClusters {
       out.first[direction] = first;
       out.second[direction] = all & ~first;
     }
-    return row.count(w);
+    return count;
   }
 
   template <class Crossed>
@@ -109,21 +112,19 @@ class LabelClusters {
     const Directions joined = kept.directions();
     if (!kept.is_junction()) return loss_of_components(links_, joined, facts);
     look_around(at);
-    JoinedPoints points;
+    JoinedPoints points = {};
     ClusterLoss loss = {.vertices = ~std::uint64_t{0}};  // one vertex remains
     const StarPoints& all = points_[parity(at)];
     const auto lose = [&](const StarPoint& point) {
       ++(point.is_below ? loss.vertices_below : loss.vertices);
     };
     for (Directions rest = joined; rest != 0; rest &= rest - 1) lose(all[0][first_of(rest)]);
-    visit_joined(all[1], joined, [&](std::size_t n, const StarPoint& point) {
-      points.faces |= std::uint64_t{1} << n;
-      lose(point);
-    });
-    visit_joined(all[2], joined, [&](std::size_t n, const StarPoint& point) {
-      points.centres |= std::uint64_t{1} << n;
-      lose(point);
-    });
+    for (std::size_t kind = 1; kind < all.size(); ++kind) {
+      visit_joined(all[kind], joined, [&](std::size_t n, const StarPoint& point) {
+        points[kind - 1] |= std::uint64_t{1} << n;
+        lose(point);
+      });
+    }
     layer.points.push_back(points);
     for (const Directions corners : links_.above(parity(at))) {
       loss.triangles += lost_triangles(corners & joined);
@@ -145,16 +146,14 @@ class LabelClusters {
   // Looks up the labels of the sample's neighbours, those that the volume has.
   void look_around(const GridSample& at) {
     const auto directions = links_.directions();
-    if (at.y != row_y_ || at.z != row_z_ || !has_row_) {
+    if (row_ != std::pair(at.y, at.z)) {
       for (std::size_t d = 0; d < directions.size(); ++d) {
         const auto& step = directions[d].step;
         rows_[d] = field_.labels(at.y + static_cast<std::uint32_t>(step[1]),
                                  at.z + static_cast<std::uint32_t>(step[2])) +
                    step[0];
       }
-      row_y_ = at.y;
-      row_z_ = at.z;
-      has_row_ = true;
+      row_ = std::pair(at.y, at.z);
     }
     for (std::size_t d = 0; d < directions.size(); ++d) around_[d] = rows_[d][at.x];
   }
@@ -271,10 +270,8 @@ class LabelClusters {
   const Links& links_;
   const std::array<StarPoints, 2>& points_;
   LabelField field_;
-  bool has_row_ = false;
-  std::uint32_t row_y_ = 0;
-  std::uint32_t row_z_ = 0;
-  std::array<const PartNumber*, kMostDirections> rows_ = {};  // of the neighbours, by direction
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> row_;  // that rows_ are around
+  std::array<const PartNumber*, kMostDirections> rows_ = {};    // of the neighbours, by direction
   std::array<PartNumber, kMostDirections> around_ = {};
 };
 

@@ -86,7 +86,8 @@ class PartsOf final : public SampleParts {
  public:
   PartsOf(const Lattice<T>& lattice, const LabelParts& parts) : lattice_(lattice) {
     for (const auto& [value, number] : parts.values()) {
-      if (std::in_range<T>(value)) numbers_[static_cast<T>(value)] = number;  // no sample has others
+      if (std::in_range<T>(value))
+        numbers_[static_cast<T>(value)] = number;  // no sample has others
     }
   }
 

@@ -152,18 +152,17 @@ std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
 
 std::vector<LabelVoxels> chosen_labels(std::span<const LabelVoxels> counted,
                                        const MeshParameters& parameters) {
-  const auto there = labels_of(counted, parameters.background, parameters.label_values);
+  auto labels = labels_of(counted, parameters.background, parameters.label_values);
   std::optional<std::vector<std::int64_t>> wanted;
   if (!parameters.labels->is_all()) wanted = parameters.labels->values;
-  const auto chosen = select_labels(there, parameters.background, wanted);
+  const auto chosen = select_labels(labels, parameters.background, wanted);
   if (chosen.empty()) {
     throw Error(ErrorCode::kUnusableVolume,
                 "the volume has no labels: all samples are background, " +
                     std::to_string(parameters.background));
   }
-  std::vector<LabelVoxels> labels;
-  std::ranges::copy_if(there, std::back_inserter(labels), [&](const LabelVoxels& label) {
-    return std::ranges::binary_search(chosen, label.label);
+  std::erase_if(labels, [&](const LabelVoxels& label) {
+    return !std::ranges::binary_search(chosen, label.label);
   });
   return labels;
 }

@@ -1,5 +1,5 @@
-// What the walk that writes needs of labels, as regular-inl.h has it for an iso-value. Compiled once
-// for each instruction set, see slabs.cpp.
+// What the walk that writes needs of labels, as regular-inl.h has it for an iso-value. Compiled
+// once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_LABEL_WRITER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_LABEL_WRITER_INL_H_
 #undef ISOMESH_LABEL_WRITER_INL_H_
@@ -26,19 +26,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
-
-// A row of samples without the vertices that clusters have instead of its slots.
-struct WrittenRow {
-  bool may_cross(std::size_t w) const { return row.may_cross(w); }
-  Word describe(std::size_t w, LabelCells& cells) const { return row.describe(w, cells); }
-  HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const LabelCells& cells,
-                                 std::uint32_t* next) const {
-    return row.list(joined[x], x, bit, cells, next);
-  }
-
-  LabelRow row;
-  const std::uint32_t* joined;  // for each sample the set of its slots that are some cluster's
-};
 
 // Writes the triangles of the cells of one row, and what is on their sides. Where there are
 // clusters, it leaves triangles out of which two corners are one vertex.
@@ -138,8 +125,8 @@ class LabelWriter {
   }
 
   void reach(std::uint32_t z) { field_.reach(z); }
-  WrittenRow row(std::uint32_t y, std::uint32_t z) const {
-    return {field_.row(y, z), joined_.row(y, z)};
+  LabelRow row(std::uint32_t y, std::uint32_t z) const {
+    return field_.row(y, z, joined_.row(y, z));
   }
 
   static Mesh& mesh_of(SeparatingSurface& surface) { return surface.mesh; }
@@ -244,8 +231,7 @@ class LabelWriter {
     joined_.mark(
         separation_.clusters, y, z,
         [&](const JoiningPlace& at, const Joined& joined, const JoinedPoints* points, auto visit) {
-          visit_points(separation_.parity(at.x, at.row, at.z),
-                       sets_of(joined.directions(), points),
+          visit_points(separation_.parity(at.x, at.row, at.z), sets_of(joined.directions(), points),
                        [&](const PlacedPoint& point) { visit(point.name); });
         });
     const LatticeToSpace& map = separation_.to_space;
@@ -302,7 +288,7 @@ class LabelWriter {
 
   static PointSets sets_of(Directions edges, const JoinedPoints* points) {
     if (points == nullptr) return {edges, 0, 0};
-    return {edges, points->faces, points->centres};
+    return {edges, (*points)[0], (*points)[1]};
   }
 
   template <class Visit>

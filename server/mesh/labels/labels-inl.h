@@ -40,19 +40,28 @@ class LabelPlane {
   // For each word, the label that its samples and the one behind them have, or kMixed.
   const std::int32_t* wholes(std::size_t y) const { return wholes_.data() + y * words_; }
 
-  // `fill` writes the samples of a row.
-  template <class Fill>
-  void fill_row(std::size_t y, Fill fill) {
-    PartNumber* row = numbers_.data() + y * stride_;
-    fill(row);
-    std::fill(row + dims_.x, row + stride_, row[dims_.x - 1]);
-    for (std::size_t w = 0; w < words_; ++w) {
-      const PartNumber* word = row + w * kWordBits;
-      PartNumber change = 0;
-      for (std::size_t x = 0; x < kWordBits; ++x) {
-        change = static_cast<PartNumber>(change | (word[x] ^ word[x + 1]));
+  // Looks up the labels of plane z, phantoms included.
+  void look_up(const Separation& separation, std::uint32_t z) {
+    const Dims& inner = separation.samples->dims();
+    const std::uint32_t margin = separation.margin;
+    const auto is_within = [&](std::uint32_t at, std::uint32_t samples) {
+      return at >= margin && at - margin < samples;
+    };
+    for (std::uint32_t y = 0; y < dims_.y; ++y) {
+      PartNumber* const row = numbers_.data() + y * stride_;
+      std::fill_n(row, dims_.x, PartNumber{0});
+      if (is_within(y, inner.y) && is_within(z, inner.z)) {
+        separation.samples->copy_row(y - margin, z - margin, row + margin);
       }
-      wholes_[y * words_ + w] = change == 0 ? std::int32_t{word[0]} : kMixed;
+      std::fill(row + dims_.x, row + stride_, row[dims_.x - 1]);
+      for (std::size_t w = 0; w < words_; ++w) {
+        const PartNumber* word = row + w * kWordBits;
+        PartNumber change = 0;
+        for (std::size_t x = 0; x < kWordBits; ++x) {
+          change = static_cast<PartNumber>(change | (word[x] ^ word[x + 1]));
+        }
+        wholes_[y * words_ + w] = change == 0 ? std::int32_t{word[0]} : kMixed;
+      }
     }
   }
 
@@ -63,30 +72,6 @@ class LabelPlane {
   std::vector<PartNumber> numbers_;
   std::vector<std::int32_t> wholes_;
 };
-
-// Fills `plane` with the labels of plane z, phantoms included.
-inline void classify(const Separation& separation, std::uint32_t z, LabelPlane& plane) {
-  const Dims& inner = separation.samples->dims();
-  const std::uint32_t margin = separation.margin;
-  const auto is_outside = [&](std::uint32_t at, std::uint32_t samples) {
-    return at < margin || at >= samples + margin;
-  };
-  for (std::uint32_t y = 0; y < separation.dims.y; ++y) {
-    plane.fill_row(y, [&](PartNumber* row) {
-      std::fill_n(row, separation.dims.x, PartNumber{0});
-      if (is_outside(y, inner.y) || is_outside(z, inner.z)) return;
-      separation.samples->copy_row(y - margin, z - margin, row + margin);
-    });
-  }
-}
-
-// The samples of a word of which `compare` holds for their labels in `a` and in `b`.
-template <class Compare>
-HWY_INLINE Word compared(const PartNumber* a, const PartNumber* b, Compare compare) {
-  std::array<std::uint8_t, kWordBits> flags;
-  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = compare(a[x], b[x]) ? 1 : 0;
-  return pack_word(flags);
-}
 
 // The cells of a word that have several labels.
 struct LabelCells {
@@ -118,10 +103,11 @@ class LabelRow : public RowShape {
  public:
   LabelRow(const RowShape& shape, const std::array<CellSplit, 2>& splits,
            const std::array<WallCases, 2>& walls, const LabelPlane& low, const LabelPlane& high,
-           std::uint32_t y)
+           std::uint32_t y, const std::uint32_t* left_out)
       : RowShape(shape),
         splits_(splits),
         walls_(walls),
+        left_out_(left_out),
         rows_{low.row(y), low.row(next_row(y)), high.row(y), high.row(next_row(y))},
         wholes_{low.wholes(y), low.wholes(next_row(y)), high.wholes(y), high.wholes(next_row(y))} {}
 
@@ -143,38 +129,39 @@ class LabelRow : public RowShape {
   }
 
   // Lists the places of the vertices that the sample at x owns, which is `bit` of the word that
-  // `cells` are of, without those in the slots `left_out`. At least eight places of the list are
-  // written, and only those before what is returned are valid.
-  HWY_INLINE std::uint32_t* list(std::uint32_t left_out, std::size_t x, unsigned bit,
-                                 const LabelCells& cells, std::uint32_t* next) const {
+  // `cells` are of, without those that are left out. At least eight places of the list are written,
+  // and only those before what is returned are valid.
+  HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const LabelCells& cells,
+                                 std::uint32_t* next) const {
     const auto first = static_cast<std::uint32_t>(x * kSlotPlaces);
     if ((cells.several >> bit & 1) == 0) {
       const unsigned directions =
-          splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x) & ~left_out;
+          splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x) & ~left_out_[x];
       return list_members(first, directions, next);
     }
-    for (std::uint32_t slots = slots_at(x) & ~left_out; slots != 0; slots &= slots - 1) {
+    for (std::uint32_t slots = slots_at(x) & ~left_out_[x]; slots != 0; slots &= slots - 1) {
       *next++ = first + static_cast<std::uint32_t>(std::countr_zero(slots));
     }
     return next;
   }
 
-  // Word d: the samples whose edge of direction d is crossed.
-  std::array<Word, 8> crossed_edges(std::size_t w) const {
-    return crossed_edges(w, differing_corners(w));
-  }
-
   // The samples whose edge of a direction has the larger label at its first end.
   Word first_is_larger(std::size_t w, unsigned direction) const {
     return between_ends(direction, [&](unsigned a, unsigned b) {
-      const std::size_t x = w * kWordBits;
-      return compared(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1), std::greater<>());
+      return compared(w, a, b, std::greater<PartNumber>());
     });
   }
 
   WordCount count(std::size_t w) const {
+    std::array<Word, 8> crossed;
+    return count(w, crossed);
+  }
+
+  // Sets crossed[d] to the samples whose edge of direction d is crossed.
+  WordCount count(std::size_t w, std::array<Word, 8>& crossed) const {
     const CornerWords others = differing_corners(w);
-    WordCount count = {.vertices = count_bits(crossed_edges(w, others))};
+    crossed = crossed_edges(w, others);
+    WordCount count = {.vertices = count_bits(crossed)};
     LabelCells cells;
     describe(w, others, cells);
     for (Word rest = cells.crossed & ~cells.several; rest != 0; rest &= rest - 1) {
@@ -209,11 +196,17 @@ class LabelRow : public RowShape {
   }
 
  private:
-  // The cells in which corners a and b have different labels.
+  // The cells of which `compare` holds for the labels of corners a and b.
+  template <class Compare>
+  HWY_INLINE Word compared(std::size_t w, unsigned a, unsigned b, Compare compare) const {
+    const PartNumber* const first = rows_[a >> 1] + w * kWordBits + (a & 1);
+    const PartNumber* const second = rows_[b >> 1] + w * kWordBits + (b & 1);
+    std::array<std::uint8_t, kWordBits> flags;
+    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = compare(first[x], second[x]) ? 1 : 0;
+    return pack_word(flags);
+  }
   Word differ(std::size_t w, unsigned a, unsigned b) const {
-    const std::size_t x = w * kWordBits;
-    return compared(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1),
-                    std::not_equal_to<>());
+    return compared(w, a, b, std::not_equal_to<PartNumber>());
   }
 
   // Word c: the cells whose corner c has another label than corner 0.
@@ -262,6 +255,7 @@ class LabelRow : public RowShape {
 
   const std::array<CellSplit, 2>& splits_;
   const std::array<WallCases, 2>& walls_;
+  const std::uint32_t* left_out_;  // for each sample a set of its slots
   // At (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1).
   std::array<const PartNumber*, 4> rows_;
   std::array<const std::int32_t*, 4> wholes_;
@@ -283,11 +277,12 @@ class LabelField {
   // Looks up the labels up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
     for (; next_ <= z + 1 && next_ < dims_.z; ++next_) {
-      classify(separation_, next_, planes_[next_ % kPlanes]);
+      planes_[next_ % kPlanes].look_up(separation_, next_);
     }
   }
 
-  LabelRow row(std::uint32_t y, std::uint32_t z) const {
+  // `left_out`: what LabelRow::list leaves out, for each sample the set of the slots.
+  LabelRow row(std::uint32_t y, std::uint32_t z, const std::uint32_t* left_out = nullptr) const {
     const std::uint32_t above = std::min(z + 1, dims_.z - 1);
     const Word even = separation_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
     return {RowShape(dims_, separation_.scheme, even, y, z),
@@ -295,7 +290,8 @@ class LabelField {
             separation_.walls,
             planes_[z % kPlanes],
             planes_[above % kPlanes],
-            y};
+            y,
+            left_out};
   }
 
   // The numbers of the labels of a row of plane z - 1, z or z + 1.
