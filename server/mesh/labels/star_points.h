@@ -16,8 +16,9 @@
 namespace isomesh::mesh {
 
 struct StarPoint {
-  Directions neighbours = 0;                 // of the point beside the sample: one, two or three
-  std::array<std::uint8_t, 3> members = {};  // those, ascending
+  Directions neighbours = 0;  // of the point beside the sample: one, two or three
+  // Those, ascending, and then the sample itself.
+  std::array<std::uint8_t, 3> members = {kMostDirections, kMostDirections, kMostDirections};
   // The sample's corner in the cell of the name's owner, and the slot there.
   std::uint8_t corner = 0;
   std::uint8_t slot = 0;
