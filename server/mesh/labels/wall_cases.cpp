@@ -144,7 +144,8 @@ class TetrahedronBuilder {
 
   void add_three(const std::array<unsigned, 4>& classes, const std::array<unsigned, 4>& sizes) {
     std::array<unsigned, 4> order = {0, 1, 2, 3};
-    std::ranges::stable_partition(order, [&](unsigned i) { return sizes[classes[i]] == 2; });
+    std::stable_partition(order.begin(), order.end(),
+                          [&](unsigned i) { return sizes[classes[i]] == 2; });
     const auto [a, a2, b, c] = order;
     const Spot face = spot(a, b, c);
     const Spot face2 = spot(a2, b, c);
