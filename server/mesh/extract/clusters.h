@@ -1,6 +1,7 @@
 // The crossings of a surface that are joined into one vertex; see links.h for the rule.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <span>
@@ -33,12 +34,9 @@ struct JoiningWord {
   std::uint32_t first = 0;    // where their directions begin in ClusterLayer::joined
 };
 
-// The points that such a sample of a junction joins with its crossings; a bit for each place in the
-// lists of star_points.h.
-struct JoinedPoints {
-  std::uint64_t faces = 0;
-  std::uint64_t centres = 0;
-};
+// The points in faces, and the centres, that such a sample of a junction joins with its crossings;
+// a bit for each place in the lists of star_points.h.
+using JoinedPoints = std::array<std::uint64_t, 2>;
 
 // The joined crossings of one plane of samples. Empty if there are none. On the body-centred
 // lattice a row of samples and a row of centres follow each other.

@@ -27,7 +27,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <utility>
 
 #include <hwy/highway.h>
 
@@ -63,7 +65,8 @@ class LabelClusters {
     out.any = 0;
     const LabelRow row = field_.row(y, z);
     if (!row.may_cross(w)) return {};
-    const std::array<Word, 8> crossed = row.crossed_edges(w);
+    std::array<Word, 8> crossed;
+    const WordCount count = row.count(w, crossed);
     for (const Word all : crossed) out.any |= all;
     for (unsigned direction = 1; direction < 8; ++direction) {
       const Word all = crossed[direction];
@@ -71,7 +74,7 @@ class LabelClusters {
       out.first[direction] = first;
       out.second[direction] = all & ~first;
     }
-    return row.count(w);
+    return count;
   }
 
   template <class Crossed>
@@ -109,21 +112,19 @@ class LabelClusters {
     const Directions joined = kept.directions();
     if (!kept.is_junction()) return loss_of_components(links_, joined, facts);
     look_around(at);
-    JoinedPoints points;
+    JoinedPoints points = {};
     ClusterLoss loss = {.vertices = ~std::uint64_t{0}};  // one vertex remains
     const StarPoints& all = points_[parity(at)];
     const auto lose = [&](const StarPoint& point) {
       ++(point.is_below ? loss.vertices_below : loss.vertices);
     };
-    for (Directions rest = joined; rest != 0; rest &= rest - 1) lose(all.edges[first_of(rest)]);
-    visit_joined(all.faces, joined, [&](std::size_t n, const StarPoint& point) {
-      points.faces |= std::uint64_t{1} << n;
-      lose(point);
-    });
-    visit_joined(all.centres, joined, [&](std::size_t n, const StarPoint& point) {
-      points.centres |= std::uint64_t{1} << n;
-      lose(point);
-    });
+    for (Directions rest = joined; rest != 0; rest &= rest - 1) lose(all[0][first_of(rest)]);
+    for (std::size_t kind = 1; kind < all.size(); ++kind) {
+      points[kind - 1] = points_among(all[kind], joined);
+      for (std::uint64_t rest = points[kind - 1]; rest != 0; rest &= rest - 1) {
+        lose(all[kind][static_cast<std::size_t>(std::countr_zero(rest))]);
+      }
+    }
     layer.points.push_back(points);
     for (const Directions corners : links_.above(parity(at))) {
       loss.triangles += lost_triangles(corners & joined);
@@ -145,18 +146,17 @@ class LabelClusters {
   // Looks up the labels of the sample's neighbours, those that the volume has.
   void look_around(const GridSample& at) {
     const auto directions = links_.directions();
-    if (at.y != row_y_ || at.z != row_z_ || !has_row_) {
+    if (row_ != std::pair(at.y, at.z)) {
       for (std::size_t d = 0; d < directions.size(); ++d) {
         const auto& step = directions[d].step;
         rows_[d] = field_.labels(at.y + static_cast<std::uint32_t>(step[1]),
                                  at.z + static_cast<std::uint32_t>(step[2])) +
                    step[0];
       }
-      row_y_ = at.y;
-      row_z_ = at.z;
-      has_row_ = true;
+      row_ = std::pair(at.y, at.z);
     }
     for (std::size_t d = 0; d < directions.size(); ++d) around_[d] = rows_[d][at.x];
+    around_[kMostDirections] = label(at);
   }
 
   // True if the neighbours with other labels have more than one label.
@@ -199,14 +199,7 @@ class LabelClusters {
       if (!is_disk(here, groups[n])) return false;
       if (labels == 3 && !is_disk(here, own & ~groups[n])) return false;
     }
-    return labels < 3 || corners(here, own) == 1;
-  }
-
-  // The tetrahedra in whose other corners, all in the set, three labels are.
-  std::size_t corners(unsigned parity, Directions set) const {
-    std::size_t count = 0;
-    visit_joined(points_[parity].centres, set, [&](std::size_t, const StarPoint&) { ++count; });
-    return count;
+    return labels < 3 || std::has_single_bit(points_among(points_[here][2], own));
   }
 
   bool meet_well(const GridSample& at, std::size_t direction, Directions mine,
@@ -234,22 +227,21 @@ class LabelClusters {
     return true;
   }
 
-  // Calls visit(place, point) for the points all of whose neighbours are in the set and have
-  // different labels.
-  template <class Visit>
-  void visit_joined(std::span<const StarPoint> points, Directions set, Visit visit) const {
+  // The points whose neighbours all are in the set of crossings and have different labels; a bit
+  // for each place in the list. Without branches: no processor could predict them.
+  std::uint64_t points_among(std::span<const StarPoint> points, Directions set) const {
+    std::uint64_t found = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {
       const StarPoint& point = points[n];
-      if ((point.neighbours & ~set) != 0) continue;
       const PartNumber a = around_[point.members[0]];
       const PartNumber b = around_[point.members[1]];
-      if (a == b) continue;
-      if (std::popcount(point.neighbours) == 3) {
-        const PartNumber c = around_[point.members[2]];
-        if (a == c || b == c) continue;
-      }
-      visit(n, point);
+      const PartNumber c = around_[point.members[2]];
+      const auto is_among = static_cast<unsigned>((point.neighbours & ~set) == 0) &
+                            static_cast<unsigned>(a != b) & static_cast<unsigned>(b != c) &
+                            static_cast<unsigned>(c != a);
+      found |= std::uint64_t{is_among} << n;
     }
+    return found;
   }
 
   // How many triangles vanish in a tetrahedron some of whose corners the sample joins, those in
@@ -271,11 +263,9 @@ class LabelClusters {
   const Links& links_;
   const std::array<StarPoints, 2>& points_;
   LabelField field_;
-  bool has_row_ = false;
-  std::uint32_t row_y_ = 0;
-  std::uint32_t row_z_ = 0;
-  std::array<const PartNumber*, kMostDirections> rows_ = {};  // of the neighbours, by direction
-  std::array<PartNumber, kMostDirections> around_ = {};
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> row_;  // that rows_ are around
+  std::array<const PartNumber*, kMostDirections> rows_ = {};    // of the neighbours, by direction
+  std::array<PartNumber, kMostDirections + 1> around_ = {};     // and the sample's own
 };
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

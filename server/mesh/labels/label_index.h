@@ -1,12 +1,13 @@
-// From a sample's value to the number of its part; private to the kernels.
+// What there is of each value of the samples, and the number of its part; private to the kernels.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <type_traits>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "server/mesh/labels/label_parts.h"
@@ -23,69 +24,47 @@
 
 namespace isomesh::mesh {
 
-// Immutable, so safe to read from several threads.
-template <class T>
-class LabelIndex {
+// A row for each value of samples: of all values, if those are few, or else of the ones that were
+// met.
+template <class T, class Row>
+class ValueTable {
  public:
-  explicit LabelIndex(const LabelParts& parts) {
-    if constexpr (kHasTable) table_.resize(std::size_t{1} << std::numeric_limits<Bits>::digits);
-    for (const auto& [wide, number] : parts.values()) {
-      if (wide < std::numeric_limits<T>::min() || wide > std::numeric_limits<T>::max()) {
-        continue;  // no sample has it
-      }
-      const auto value = static_cast<T>(wide);
-      if constexpr (kHasTable) {
-        table_[static_cast<Bits>(value)] = number;
-      } else {
-        entries_.push_back({value, number});
-      }
-    }
+  ValueTable() {
+    if constexpr (kHasAll) rows_.resize(std::size_t{1} << std::numeric_limits<Bits>::digits);
   }
 
-  PartNumber number_of(T value) const {
-    if constexpr (kHasTable) {
-      return table_[static_cast<Bits>(value)];
+  Row& operator[](T value) { return rows_[static_cast<Bits>(value)]; }
+
+  // The row, or an empty one of a value that was not met.
+  Row at(T value) const {
+    const auto bits = static_cast<Bits>(value);
+    if constexpr (kHasAll) {
+      return rows_[bits];
     } else {
-      const auto found = std::ranges::lower_bound(entries_, value, {}, &Entry::value);
-      return found != entries_.end() && found->value == value ? found->number : PartNumber{0};
+      const auto found = rows_.find(bits);
+      return found == rows_.end() ? Row{} : found->second;
     }
   }
 
-  // Writes the part numbers of `count` samples to `out`.
-  void translate(const T* samples, std::size_t count, PartNumber* out) const {
-    for (std::size_t begin = 0; begin < count; begin += kRun) {
-      translate_run(samples + begin, std::min(kRun, count - begin), out + begin);
+  bool has_met_more_than(std::size_t values) const { return !kHasAll && rows_.size() > values; }
+
+  // Calls visit(value, row) for all rows.
+  template <class Visit>
+  void visit(Visit visit) const {
+    if constexpr (kHasAll) {
+      for (std::size_t bits = 0; bits < rows_.size(); ++bits) {
+        visit(static_cast<T>(static_cast<Bits>(bits)), rows_[bits]);
+      }
+    } else {
+      for (const auto& [bits, row] : rows_) visit(static_cast<T>(bits), row);
     }
   }
 
  private:
   using Bits = std::make_unsigned_t<T>;
-  static constexpr bool kHasTable = sizeof(T) <= 2;
-  static constexpr std::size_t kRun = 64;
+  static constexpr bool kHasAll = sizeof(T) <= 2;
 
-  struct Entry {
-    T value;
-    PartNumber number;
-  };
-
-  // Neighbours mostly have the same label, so one comparison usually serves a whole run.
-  void translate_run(const T* samples, std::size_t count, PartNumber* out) const {
-    T value = samples[0];
-    PartNumber number = number_of(value);
-    T change = 0;
-    for (std::size_t i = 0; i < count; ++i) change |= static_cast<T>(samples[i] ^ value);
-    if (change == 0) {
-      std::fill_n(out, count, number);
-      return;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (samples[i] != value) number = number_of(value = samples[i]);
-      out[i] = number;
-    }
-  }
-
-  std::vector<PartNumber> table_;  // by the bits of the value
-  std::vector<Entry> entries_;     // where there are too many values for a table, ascending
+  std::conditional_t<kHasAll, std::vector<Row>, std::unordered_map<Bits, Row>> rows_;
 };
 
 // The part number of each sample of a lattice, behind one interface for all sample types, so that
@@ -105,22 +84,48 @@ class SampleParts {
 template <class T>
 class PartsOf final : public SampleParts {
  public:
-  PartsOf(const Lattice<T>& lattice, const LabelParts& parts) : lattice_(lattice), index_(parts) {}
+  PartsOf(const Lattice<T>& lattice, const LabelParts& parts) : lattice_(lattice) {
+    for (const auto& [value, number] : parts.values()) {
+      if (std::in_range<T>(value))
+        numbers_[static_cast<T>(value)] = number;  // no sample has others
+    }
+  }
 
   const Dims& dims() const override { return lattice_.dims; }
 
   PartNumber part(std::uint64_t sample) const override {
-    return index_.number_of(lattice_.samples[sample]);
+    return numbers_.at(lattice_.samples[sample]);
   }
 
   void copy_row(std::uint32_t y, std::uint32_t z, PartNumber* out) const override {
-    const Dims& dims = lattice_.dims;
-    index_.translate(lattice_.samples + (std::size_t{z} * dims.y + y) * dims.x, dims.x, out);
+    const std::size_t width = lattice_.dims.x;
+    const T* row = lattice_.samples + (std::size_t{z} * lattice_.dims.y + y) * width;
+    for (std::size_t begin = 0; begin < width; begin += kRun) {
+      translate_run(row + begin, std::min(kRun, width - begin), out + begin);
+    }
   }
 
  private:
+  static constexpr std::size_t kRun = 64;
+
+  // Neighbours mostly have the same label, so one comparison usually serves a whole run.
+  void translate_run(const T* samples, std::size_t count, PartNumber* out) const {
+    T value = samples[0];
+    PartNumber number = numbers_.at(value);
+    T change = 0;
+    for (std::size_t i = 0; i < count; ++i) change |= static_cast<T>(samples[i] ^ value);
+    if (change == 0) {
+      std::fill_n(out, count, number);
+      return;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (samples[i] != value) number = numbers_.at(value = samples[i]);
+      out[i] = number;
+    }
+  }
+
   const Lattice<T>& lattice_;
-  const LabelIndex<T> index_;
+  ValueTable<T, PartNumber> numbers_;
 };
 
 }  // namespace isomesh::mesh

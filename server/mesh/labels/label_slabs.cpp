@@ -10,8 +10,8 @@
 #include "server/mesh/extract/slab_passes.h"
 #include "server/mesh/extract/slab_walk-inl.h"
 #include "server/mesh/labels/label_clusters-inl.h"
+#include "server/mesh/labels/label_writer-inl.h"
 #include "server/mesh/labels/labels-inl.h"
-#include "server/mesh/labels/regular_labels-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
@@ -23,10 +23,7 @@ void count_labels(const Separation& separation, const Slab& slab, SurfaceCount& 
 
 void write_labels(const Separation& separation, const Slab& slab, IndexMemory& memory,
                   SeparatingSurface& surface) {
-  if (separation.regularize) {
-    return write_slab_of<RegularLabelField>(separation, slab, memory, surface);
-  }
-  write_slab_of<LabelField>(separation, slab, memory, surface);
+  write_slab_of<LabelWriter>(separation, slab, memory, surface);
 }
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

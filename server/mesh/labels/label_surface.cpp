@@ -24,10 +24,9 @@ class VertexChoice {
     std::uint32_t low = std::numeric_limits<std::uint32_t>::max();
     std::uint32_t high = 0;
     for (const Triangle& triangle : triangles) {
-      for (const std::uint32_t v : triangle) {
-        low = std::min(low, v);
-        high = std::max(high, v);
-      }
+      const auto& [a, b, c] = triangle;
+      low = std::min({low, a, b, c});
+      high = std::max({high, a, b, c});
     }
     if (triangles.empty()) return;
     first_ = low / kWordBits * kWordBits;
@@ -201,8 +200,7 @@ std::vector<LabelMeasure> measure_labels(const SeparatingSurface& walls,
 
 std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Context& context) {
   const Mesh& mesh = surface.mesh;
-  using Sides = std::pair<PartNumber, PartNumber>;
-  std::vector<std::map<Sides, double>> layers(mesh.layers());
+  std::vector<std::map<WallSides, double>> layers(mesh.layers());
   parallel_for(context, layers.size(), [&](std::size_t layer) {
     WallSides last;
     double* area = nullptr;  // of those sides: neighbours mostly have the same
@@ -210,7 +208,7 @@ std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Cont
       const auto at = [&](std::size_t i) { return to_point(mesh.positions[mesh.triangles[t][i]]); };
       const Point normal = normal_of(at(0), at(1), at(2));
       const WallSides& sides = surface.sides[t];
-      if (sides != last || area == nullptr) area = &layers[layer][{sides.front, sides.back}];
+      if (sides != last || area == nullptr) area = &layers[layer][sides];
       last = sides;
       *area += std::sqrt(dot(normal, normal)) / 2;
     }
@@ -219,7 +217,7 @@ std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Cont
   for (const auto& layer : layers) {
     for (const auto& [sides, area] : layer) {
       std::array<std::vector<std::size_t>, 2> labels;  // on one side alone
-      surface.parts.visit_labels(sides.first, sides.second, [&](std::size_t label, bool is_front) {
+      surface.parts.visit_labels(sides.front, sides.back, [&](std::size_t label, bool is_front) {
         labels[is_front ? 0 : 1].push_back(label);
       });
       for (auto& side : labels) {

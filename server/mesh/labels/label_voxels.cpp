@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <string>
-#include <type_traits>
 #include <unordered_map>
 #include <utility>
 
-#include "server/mesh/labels/label_slabs.h"
+#include "server/mesh/labels/label_index.h"
+#include "server/mesh/labels/separate.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
@@ -18,60 +17,10 @@ namespace {
 constexpr std::size_t kPlanesPerTask = 16;
 constexpr std::size_t kMostValues = kMostLabels + 1;  // with the background
 
-void add_run(LabelVoxels& label, std::uint32_t begin, std::uint32_t end, std::uint32_t y,
-             std::uint32_t z) {
-  const std::array<std::uint32_t, 3> first = {begin, y, z};
-  const std::array<std::uint32_t, 3> last = {end - 1, y, z};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    label.low[axis] = label.voxels == 0 ? first[axis] : std::min(label.low[axis], first[axis]);
-    label.high[axis] = std::max(label.high[axis], last[axis]);
-  }
-  label.voxels += end - begin;
-}
-
-// The labels that have been met, by value.
-template <class T, bool kIsSmall = sizeof(T) <= 2>
-class LabelTable {
- public:
-  LabelTable() : labels_(std::size_t{1} << std::numeric_limits<Bits>::digits) {}
-
-  LabelVoxels& at(T value) { return labels_[static_cast<Bits>(value)]; }
-
-  template <class Visit>
-  void visit(Visit visit) const {
-    for (std::size_t bits = 0; bits < labels_.size(); ++bits) {
-      if (labels_[bits].voxels > 0) visit(static_cast<T>(static_cast<Bits>(bits)), labels_[bits]);
-    }
-  }
-
- private:
-  using Bits = std::make_unsigned_t<T>;
-  std::vector<LabelVoxels> labels_;
-};
-
-// For types with too many values for a table with one row each.
-template <class T>
-class LabelTable<T, false> {
- public:
-  LabelVoxels& at(T value) {
-    LabelVoxels& label = labels_[value];
-    if (labels_.size() > kMostValues) throw_too_many_labels();
-    return label;
-  }
-
-  template <class Visit>
-  void visit(Visit visit) const {
-    for (const auto& [value, label] : labels_) visit(value, label);
-  }
-
- private:
-  std::unordered_map<T, LabelVoxels> labels_;
-};
-
 template <class T>
 std::vector<LabelVoxels> count_planes(const Lattice<T>& lattice, std::uint32_t begin,
                                       std::uint32_t end) {
-  LabelTable<T> table;
+  ValueTable<T, LabelVoxels> table;
   const std::uint32_t width = lattice.dims.x;
   for (std::uint32_t z = begin; z < end; ++z) {
     for (std::uint32_t y = 0; y < lattice.dims.y; ++y) {
@@ -80,14 +29,17 @@ std::vector<LabelVoxels> count_planes(const Lattice<T>& lattice, std::uint32_t b
         const std::uint32_t first = x;
         while (++x < width && row[x] == row[first]) {
         }
-        add_run(table.at(row[first]), first, x, y, z);
+        const LabelVoxels run = {.voxels = x - first, .low = {first, y, z}, .high = {x - 1, y, z}};
+        add_voxels(run, table[row[first]]);
       }
+      if (table.has_met_more_than(kMostValues)) throw_too_many_labels();
     }
   }
   std::vector<LabelVoxels> labels;
-  table.visit([&](T value, LabelVoxels label) {
-    label.label = value;
+  table.visit([&](T value, const LabelVoxels& label) {
+    if (label.voxels == 0) return;
     labels.push_back(label);
+    labels.back().label = value;
   });
   return labels;
 }
@@ -109,9 +61,9 @@ std::string missing_labels(std::span<const std::int64_t> labels,
 }  // namespace
 
 void add_voxels(const LabelVoxels& part, LabelVoxels& whole) {
+  if (whole.voxels == 0) whole.low = part.low;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    whole.low[axis] =
-        whole.voxels == 0 ? part.low[axis] : std::min(whole.low[axis], part.low[axis]);
+    whole.low[axis] = std::min(whole.low[axis], part.low[axis]);
     whole.high[axis] = std::max(whole.high[axis], part.high[axis]);
   }
   whole.voxels += part.voxels;
@@ -200,18 +152,17 @@ std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
 
 std::vector<LabelVoxels> chosen_labels(std::span<const LabelVoxels> counted,
                                        const MeshParameters& parameters) {
-  const auto there = labels_of(counted, parameters.background, parameters.label_values);
+  auto labels = labels_of(counted, parameters.background, parameters.label_values);
   std::optional<std::vector<std::int64_t>> wanted;
   if (!parameters.labels->is_all()) wanted = parameters.labels->values;
-  const auto chosen = select_labels(there, parameters.background, wanted);
+  const auto chosen = select_labels(labels, parameters.background, wanted);
   if (chosen.empty()) {
     throw Error(ErrorCode::kUnusableVolume,
                 "the volume has no labels: all samples are background, " +
                     std::to_string(parameters.background));
   }
-  std::vector<LabelVoxels> labels;
-  std::ranges::copy_if(there, std::back_inserter(labels), [&](const LabelVoxels& label) {
-    return std::ranges::binary_search(chosen, label.label);
+  std::erase_if(labels, [&](const LabelVoxels& label) {
+    return !std::ranges::binary_search(chosen, label.label);
   });
   return labels;
 }

@@ -13,18 +13,65 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <span>
-#include <utility>
+#include <vector>
 
 #include <hwy/highway.h>
 
-#include "server/mesh/extract/links.h"
-#include "server/mesh/labels/label_planes-inl.h"
 #include "server/mesh/labels/label_slabs.h"
 #include "server/mesh/lattice/rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
+
+// The label numbers of one plane of samples. Each row goes on with its last one, so that the word
+// after a row's last sample can be read.
+class LabelPlane {
+ public:
+  static constexpr std::int32_t kMixed = -1;
+
+  explicit LabelPlane(const Dims& dims)
+      : dims_(dims),
+        words_(words_of(dims.x)),
+        stride_(words_ * kWordBits + 1),
+        numbers_(stride_ * dims.y),
+        wholes_(words_ * dims.y) {}
+
+  const PartNumber* row(std::size_t y) const { return numbers_.data() + y * stride_; }
+  // For each word, the label that its samples and the one behind them have, or kMixed.
+  const std::int32_t* wholes(std::size_t y) const { return wholes_.data() + y * words_; }
+
+  // Looks up the labels of plane z, phantoms included.
+  void look_up(const Separation& separation, std::uint32_t z) {
+    const Dims& inner = separation.samples->dims();
+    const std::uint32_t margin = separation.margin;
+    const auto is_within = [&](std::uint32_t at, std::uint32_t samples) {
+      return at >= margin && at - margin < samples;
+    };
+    for (std::uint32_t y = 0; y < dims_.y; ++y) {
+      PartNumber* const row = numbers_.data() + y * stride_;
+      std::fill_n(row, dims_.x, PartNumber{0});
+      if (is_within(y, inner.y) && is_within(z, inner.z)) {
+        separation.samples->copy_row(y - margin, z - margin, row + margin);
+      }
+      std::fill(row + dims_.x, row + stride_, row[dims_.x - 1]);
+      for (std::size_t w = 0; w < words_; ++w) {
+        const PartNumber* word = row + w * kWordBits;
+        PartNumber change = 0;
+        for (std::size_t x = 0; x < kWordBits; ++x) {
+          change = static_cast<PartNumber>(change | (word[x] ^ word[x + 1]));
+        }
+        wholes_[y * words_ + w] = change == 0 ? std::int32_t{word[0]} : kMixed;
+      }
+    }
+  }
+
+ private:
+  Dims dims_;
+  std::size_t words_;
+  std::size_t stride_;
+  std::vector<PartNumber> numbers_;
+  std::vector<std::int32_t> wholes_;
+};
 
 // The cells of a word that have several labels.
 struct LabelCells {
@@ -56,10 +103,11 @@ class LabelRow : public RowShape {
  public:
   LabelRow(const RowShape& shape, const std::array<CellSplit, 2>& splits,
            const std::array<WallCases, 2>& walls, const LabelPlane& low, const LabelPlane& high,
-           std::uint32_t y)
+           std::uint32_t y, const std::uint32_t* left_out)
       : RowShape(shape),
         splits_(splits),
         walls_(walls),
+        left_out_(left_out),
         rows_{low.row(y), low.row(next_row(y)), high.row(y), high.row(next_row(y))},
         wholes_{low.wholes(y), low.wholes(next_row(y)), high.wholes(y), high.wholes(next_row(y))} {}
 
@@ -81,29 +129,39 @@ class LabelRow : public RowShape {
   }
 
   // Lists the places of the vertices that the sample at x owns, which is `bit` of the word that
-  // `cells` are of. At least eight places of the list are written, and only those before what is
-  // returned are valid.
+  // `cells` are of, without those that are left out. At least eight places of the list are written,
+  // and only those before what is returned are valid.
   HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const LabelCells& cells,
                                  std::uint32_t* next) const {
-    return list_without(0, x, bit, cells, next);
-  }
-
-  // Word d: the samples whose edge of direction d is crossed.
-  std::array<Word, 8> crossed_edges(std::size_t w) const {
-    return crossed_edges(w, differing_corners(w));
+    const auto first = static_cast<std::uint32_t>(x * kSlotPlaces);
+    if ((cells.several >> bit & 1) == 0) {
+      const unsigned directions =
+          splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x) & ~left_out_[x];
+      return list_members(first, directions, next);
+    }
+    for (std::uint32_t slots = slots_at(x) & ~left_out_[x]; slots != 0; slots &= slots - 1) {
+      *next++ = first + static_cast<std::uint32_t>(std::countr_zero(slots));
+    }
+    return next;
   }
 
   // The samples whose edge of a direction has the larger label at its first end.
   Word first_is_larger(std::size_t w, unsigned direction) const {
     return between_ends(direction, [&](unsigned a, unsigned b) {
-      const std::size_t x = w * kWordBits;
-      return compared(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1), std::greater<>());
+      return compared(w, a, b, std::greater<PartNumber>());
     });
   }
 
   WordCount count(std::size_t w) const {
+    std::array<Word, 8> crossed;
+    return count(w, crossed);
+  }
+
+  // Sets crossed[d] to the samples whose edge of direction d is crossed.
+  WordCount count(std::size_t w, std::array<Word, 8>& crossed) const {
     const CornerWords others = differing_corners(w);
-    WordCount count = {.vertices = count_bits(crossed_edges(w, others))};
+    crossed = crossed_edges(w, others);
+    WordCount count = {.vertices = count_bits(crossed)};
     LabelCells cells;
     describe(w, others, cells);
     for (Word rest = cells.crossed & ~cells.several; rest != 0; rest &= rest - 1) {
@@ -137,28 +195,18 @@ class LabelRow : public RowShape {
     return labels;
   }
 
- protected:
-  // Like list(), but without the vertices in the slots `left_out`.
-  HWY_INLINE std::uint32_t* list_without(std::uint32_t left_out, std::size_t x, unsigned bit,
-                                         const LabelCells& cells, std::uint32_t* next) const {
-    const auto first = static_cast<std::uint32_t>(x * kSlotPlaces);
-    if ((cells.several >> bit & 1) == 0) {
-      const unsigned directions =
-          splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x) & ~left_out;
-      return list_members(first, directions, next);
-    }
-    for (std::uint32_t slots = slots_at(x) & ~left_out; slots != 0; slots &= slots - 1) {
-      *next++ = first + static_cast<std::uint32_t>(std::countr_zero(slots));
-    }
-    return next;
-  }
-
  private:
-  // The cells in which corners a and b have different labels.
+  // The cells of which `compare` holds for the labels of corners a and b.
+  template <class Compare>
+  HWY_INLINE Word compared(std::size_t w, unsigned a, unsigned b, Compare compare) const {
+    const PartNumber* const first = rows_[a >> 1] + w * kWordBits + (a & 1);
+    const PartNumber* const second = rows_[b >> 1] + w * kWordBits + (b & 1);
+    std::array<std::uint8_t, kWordBits> flags;
+    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = compare(first[x], second[x]) ? 1 : 0;
+    return pack_word(flags);
+  }
   Word differ(std::size_t w, unsigned a, unsigned b) const {
-    const std::size_t x = w * kWordBits;
-    return compared(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1),
-                    std::not_equal_to<>());
+    return compared(w, a, b, std::not_equal_to<PartNumber>());
   }
 
   // Word c: the cells whose corner c has another label than corner 0.
@@ -207,121 +255,34 @@ class LabelRow : public RowShape {
 
   const std::array<CellSplit, 2>& splits_;
   const std::array<WallCases, 2>& walls_;
+  const std::uint32_t* left_out_;  // for each sample a set of its slots
   // At (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1).
   std::array<const PartNumber*, 4> rows_;
   std::array<const std::int32_t*, 4> wholes_;
 };
 
-// Writes the triangles of the cells of one row, and what is on their sides. Where there are
-// clusters, it leaves triangles out of which two corners are one vertex.
-template <bool kHasClusters>
-class LabelCellWriter {
- public:
-  LabelCellWriter(const Separation& separation, const LabelRow& row, const EdgeOffsets& offsets,
-                  std::uint32_t z, SeparatingSurface& surface)
-      : separation_(separation),
-        row_(row),
-        offsets_(offsets),
-        triangles_(surface.mesh.triangles.data()),
-        end_(triangles_ + surface.mesh.layer_triangles[z + 1]),
-        sides_(surface.sides.data()) {}
-
-  // Writes the triangles of the cell at x and their sides. The cell is bit `bit` of the word that
-  // `cells` describes. Returns the end of the triangles.
-  HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const LabelCells& cells,
-                             const std::uint32_t* places, Triangle* out) const {
-    if ((cells.several >> bit & 1) != 0) return write_several(x, places, out);
-    const unsigned inside = cells.cases[bit];
-    const CellCase& cell = separation_.splits[row_.parity_at(x)].cases[inside];
-    Triangle* end = nullptr;
-    if constexpr (kHasClusters) {
-      end = write_kept(cell, places, offsets_, end_, out);
-    } else {
-      end = write_case(cell, places, offsets_, out);
-    }
-    const WallSides sides = {row_.label(static_cast<unsigned>(std::countr_one(inside)), x),
-                             row_.label(static_cast<unsigned>(std::countr_zero(inside)), x)};
-    std::fill(sides_ + (out - triangles_), sides_ + (end - triangles_), sides);
-    return end;
-  }
-
- private:
-  Triangle* write_several(std::size_t x, const std::uint32_t* places, Triangle* out) const {
-    const std::array<PartNumber, 8> labels = row_.labels_at(x);
-    const unsigned parity = row_.parity_at(x);
-    const CellSplit& split = separation_.splits[parity];
-    const auto index = [&](VertexName name) {
-      return places[offsets_[edge_name(name / kSlotPlaces, 0)] +
-                    static_cast<std::ptrdiff_t>(name % kSlotPlaces)];
-    };
-    for (std::size_t t = 0; t < split.tetrahedra; ++t) {
-      const unsigned pattern = pattern_in(labels, split.corners[t]);
-      const TetrahedronWalls& walls = separation_.walls[parity].tetrahedra[t][pattern];
-      for (std::size_t i = 0; i < walls.triangles; ++i) {
-        const WallTriangle& wall = walls.walls[i];
-        Triangle triangle = {index(wall.vertices[0]), index(wall.vertices[1]),
-                             index(wall.vertices[2])};
-        WallSides sides = {labels[wall.front], labels[wall.back]};
-        const auto& [a, b, c] = triangle;
-        if (kHasClusters && (a == b || b == c || c == a)) continue;
-        if (sides.front > sides.back) {
-          std::swap(sides.front, sides.back);
-          std::swap(triangle[1], triangle[2]);
-        }
-        sides_[out - triangles_] = sides;
-        *out++ = triangle;
-      }
-    }
-    return out;
-  }
-
-  const Separation& separation_;
-  const LabelRow row_;
-  const EdgeOffsets& offsets_;
-  Triangle* triangles_;
-  const Triangle* end_;  // of the layer's triangles
-  WallSides* sides_;
-};
-
-// The labels that the walk reads: those of the planes around the current one. Each plane is looked
+// The labels that the walks read: those of the planes around the current one. Each plane is looked
 // up once, as z rises.
 class LabelField {
  public:
   using Marched = Separation;
-  using Output = SeparatingSurface;
   using Cells = LabelCells;
-  using Row = LabelRow;
-  static constexpr std::size_t kPlaces = kSlotPlaces;
-  static constexpr bool kHasLines = true;
-  static constexpr bool kHasClusters = false;
 
   LabelField(const Separation& separation, std::uint32_t first)
       : separation_(separation),
         dims_(separation.dims),
         planes_{LabelPlane(dims_), LabelPlane(dims_), LabelPlane(dims_)},
-        next_(first) {
-    const std::span<const LinkDirection> directions = links_of(separation.scheme).directions();
-    for (unsigned parity = 0; parity < 2; ++parity) {
-      for (std::size_t place = 0; place < kEdgePlaces; ++place) {
-        const auto& ends = separation.walls[parity].slots[place].corners;
-        for (std::size_t end = 0; end < 2; ++end) {
-          const auto step = cell_step(ends[end], ends[1 - end]);
-          const auto found = std::ranges::find(directions, step, &LinkDirection::step);
-          if (found == directions.end()) continue;  // no edge in that place
-          ways_[parity][place][end] = Directions{1} << (found - directions.begin());
-        }
-      }
-    }
-  }
+        next_(first) {}
 
   // Looks up the labels up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
     for (; next_ <= z + 1 && next_ < dims_.z; ++next_) {
-      classify(separation_, next_, planes_[next_ % kPlanes]);
+      planes_[next_ % kPlanes].look_up(separation_, next_);
     }
   }
 
-  LabelRow row(std::uint32_t y, std::uint32_t z) const {
+  // `left_out`: what LabelRow::list leaves out, for each sample the set of the slots.
+  LabelRow row(std::uint32_t y, std::uint32_t z, const std::uint32_t* left_out = nullptr) const {
     const std::uint32_t above = std::min(z + 1, dims_.z - 1);
     const Word even = separation_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
     return {RowShape(dims_, separation_.scheme, even, y, z),
@@ -329,7 +290,8 @@ class LabelField {
             separation_.walls,
             planes_[z % kPlanes],
             planes_[above % kPlanes],
-            y};
+            y,
+            left_out};
   }
 
   // The numbers of the labels of a row of plane z - 1, z or z + 1.
@@ -337,140 +299,12 @@ class LabelField {
     return planes_[z % kPlanes].row(y);
   }
 
-  static Mesh& mesh_of(SeparatingSurface& surface) { return surface.mesh; }
-
-  // A vertex lies half-way on its edge, or on the line from its slot's first corner to twice the
-  // way to the mean of all.
-  EdgeFrame frame(unsigned parity, std::size_t place) const {
-    EdgeFrame frame;
-    if (place >= kSlots) return frame;
-    const Slot& slot = separation_.walls[parity].slots[place];
-    if (slot.size == 0) return frame;
-    const LatticeToSpace& map = separation_.to_space;
-    frame.start = space_offset(map, slot.corners[0]);
-    Double4 ways = {};
-    for (std::size_t i = 1; i < slot.size; ++i) {
-      ways += space_offset(map, slot.corners[i]) - frame.start;
-    }
-    frame.run = ways * 2 / static_cast<double>(slot.size);
-    return frame;
-  }
-
-  auto shares(std::uint32_t /*y*/, std::uint32_t /*z*/,
-              std::span<const std::uint32_t> /*vertices*/) const {
-    return [](std::size_t /*vertex*/) { return 0.5; };
-  }
-
-  // Phantoms have one label, so no more than one corner is one. The vertex is half-way to it from
-  // the mean of the others, which are next to it: so in a face of the box of voxels.
-  BorderVertex place_at_border(std::uint32_t x, std::uint32_t y, std::uint32_t z, std::size_t place,
-                               const EdgeFrame& frame) const {
-    const Slot& slot = separation_.walls[separation_.parity(x, y, z)].slots[place];
-    const LatticeToSpace& map = separation_.to_space;
-    // In the lattice's own numbers, in the order of place_inner for the same bits.
-    const Double4 at = row_origin(map, static_cast<double>(y) - 1, static_cast<double>(z) - 1) +
-                       lanes(map.step_x) * (static_cast<double>(x) - 1);
-    Double4 exact = at + frame.start + frame.run * 0.5;
-    const std::array<std::uint32_t, 3> cell = {x, y, z};
-    std::array<bool, 6> in_face = {true, true, true, true, true, true};
-    Double4 others = {};
-    Double4 phantom = {};
-    bool has_phantom = false;
-    for (std::size_t i = 0; i < slot.size; ++i) {
-      const unsigned corner = slot.corners[i];
-      const Double4 corner_at = space_offset(map, corner);
-      if (is_phantom(cell, corner)) {
-        has_phantom = true;
-        phantom = corner_at;
-      } else {
-        others += corner_at;
-      }
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::uint32_t to = cell[axis] + (corner >> axis & 1);
-        in_face[axis] = in_face[axis] && to == 1;
-        in_face[3 + axis] = in_face[3 + axis] && to + 2 == samples_along(axis);
-      }
-    }
-    if (has_phantom) exact = at + (others / (slot.size - 1.0) + phantom) * 0.5;
-    BorderVertex vertex;
-    for (std::size_t i = 0; i < 3; ++i) vertex.position[i] = static_cast<float>(exact[i]);
-    vertex.on_border = has_phantom || std::ranges::count(in_face, true) > 0;
-    return vertex;
-  }
-
-  // Tells the owners of vertices that samples of a row name, in the places `vertices`. `first` is
-  // the first one's number.
-  void tell_owners(std::uint32_t y, std::uint32_t z, std::span<const std::uint32_t> vertices,
-                   std::uint32_t first, SeparatingSurface& surface) const {
-    const std::uint32_t behind = std::min(y + 1, dims_.y - 1);
-    const std::uint32_t above = std::min(z + 1, dims_.z - 1);
-    const std::array rows = {labels(y, z), labels(behind, z), labels(y, above),
-                             labels(behind, above)};
-    const unsigned row_parity = separation_.parity(0, y, z);
-    VertexOwner* out = surface.owners.data() + first;
-    for (const std::uint32_t vertex : vertices) {
-      const std::uint32_t x = vertex / kPlaces;
-      const std::size_t place = vertex % kPlaces;
-      const unsigned parity = (x + row_parity) & 1;
-      const Slot& slot = separation_.walls[parity].slots[place];
-      std::size_t owner = 0;
-      PartNumber most = 0;
-      for (std::size_t i = 0; i < slot.size; ++i) {
-        const unsigned corner = slot.corners[i];
-        const PartNumber label = rows[corner >> 1][x + (corner & 1)];
-        if (label <= most) continue;
-        most = label;
-        owner = i;
-      }
-      const unsigned corner = slot.corners[owner];
-      *out = {};
-      out->sample = sample_at(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2));
-      if (place < kEdgePlaces) out->directions = ways_[parity][place][owner];
-      ++out;
-    }
-  }
-
-  LabelCellWriter<false> cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
-                                     SeparatingSurface& surface) const {
-    return {separation_, row(y, z), offsets, z, surface};
-  }
-
- protected:
-  // In the lattice's own numbers, where phantoms are numbered too.
-  std::uint64_t sample_at(std::uint32_t x, std::uint32_t y, std::uint32_t z) const {
-    const Dims& inner = separation_.samples->dims();
-    const std::uint32_t margin = separation_.margin;
-    return (std::uint64_t{z - margin} * inner.y + (y - margin)) * inner.x + (x - margin);
-  }
-
  private:
   static constexpr std::uint32_t kPlanes = 3;
-
-  static std::array<int, 3> cell_step(unsigned from, unsigned to) {
-    std::array<int, 3> step;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      step[axis] = static_cast<int>(to >> axis & 1) - static_cast<int>(from >> axis & 1);
-    }
-    return step;
-  }
-
-  std::uint32_t samples_along(std::size_t axis) const {
-    return std::array{dims_.x, dims_.y, dims_.z}[axis];
-  }
-
-  bool is_phantom(const std::array<std::uint32_t, 3>& cell, unsigned corner) const {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::uint32_t at = cell[axis] + (corner >> axis & 1);
-      if (at == 0 || at + 1 == samples_along(axis)) return true;
-    }
-    return false;
-  }
 
   const Separation& separation_;
   const Dims dims_;
   std::array<LabelPlane, kPlanes> planes_;
-  // By parity and place of an edge: its direction from its first end, and from its second.
-  std::array<std::array<std::array<Directions, 2>, kEdgePlaces>, 2> ways_ = {};
   std::uint32_t next_;
 };
 

@@ -14,6 +14,7 @@
 // box are bevelled. (Caps of an iso-value lie in the outermost samples themselves, border.h.)
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -50,7 +51,7 @@ struct WallSides {
   PartNumber front = 0;
   PartNumber back = 0;
 
-  bool operator==(const WallSides&) const = default;
+  auto operator<=>(const WallSides&) const = default;
 };
 
 // The sample that a vertex was made for: of those around it that with the largest number of a part,

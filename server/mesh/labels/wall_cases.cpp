@@ -21,48 +21,43 @@ Corners set_of(std::span<const std::uint8_t> corners) {
   return set;
 }
 
-// The corner that is the smallest of the set along every axis.
-unsigned owner_of(Corners set) {
-  unsigned owner = 7;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    if ((set >> corner & 1) != 0) owner &= corner;
-  }
-  return owner;
-}
-
 Slot slot_of(Corners set) {
   Slot slot;
-  for (std::uint8_t corner = 0; corner < 8; ++corner) {
-    if ((set >> corner & 1) != 0) slot.corners[slot.size++] = corner;
+  for (Corners rest = set; rest != 0; rest &= rest - 1) {
+    slot.corners[slot.size++] = static_cast<std::uint8_t>(std::countr_zero(rest));
   }
   return slot;
 }
 
-Corners corners_of(const Slot& slot) { return set_of(std::span(slot.corners).first(slot.size)); }
+// The corner that is the smallest of the set along every axis.
+unsigned owner_of(Corners set) {
+  unsigned owner = 7;
+  for (; set != 0; set &= set - 1) owner &= static_cast<unsigned>(std::countr_zero(set));
+  return owner;
+}
+
+// And the largest.
+unsigned end_of(Corners set) {
+  unsigned end = 0;
+  for (; set != 0; set &= set - 1) end |= static_cast<unsigned>(std::countr_zero(set));
+  return end;
+}
 
 using Slots = std::array<Slot, kSlots>;
 
 // The edges, faces and tetrahedra of a split cell that its corner 0 owns.
 Slots slots_of(const CellSplit& split) {
-  Slots slots = {};
-  for (unsigned direction = 1; direction < 8; ++direction) {
-    const EdgeEnds ends = split.ends[direction];
-    if (ends.from != ends.to) slots[direction] = {2, {ends.from, ends.to}};
-  }
-  std::set<Corners> faces;
-  std::set<Corners> tetrahedra;
+  std::array<std::set<Corners>, 5> found;  // by their number
   for (std::size_t t = 0; t < split.tetrahedra; ++t) {
     const Corners all = set_of(split.corners[t]);
-    tetrahedra.insert(all);
-    for (const std::uint8_t corner : split.corners[t]) {
-      const Corners face = all & ~(1U << corner);
-      if (owner_of(face) == 0) faces.insert(face);
+    for (Corners some = all; some != 0; some = (some - 1) & all) {
+      if (owner_of(some) == 0) found[static_cast<std::size_t>(std::popcount(some))].insert(some);
     }
   }
-  std::size_t next = kFaceSlot;
-  for (const Corners face : faces) slots[next++] = slot_of(face);
-  next = kTetrahedronSlot;
-  for (const Corners tetrahedron : tetrahedra) slots[next++] = slot_of(tetrahedron);
+  Slots slots = {};
+  for (const Corners edge : found[2]) slots[end_of(edge)] = slot_of(edge);
+  std::ranges::transform(found[3], slots.begin() + kFaceSlot, slot_of);
+  std::ranges::transform(found[4], slots.begin() + kTetrahedronSlot, slot_of);
   return slots;
 }
 
@@ -78,8 +73,7 @@ class TetrahedronBuilder {
     walls_ = {};
     std::array<unsigned, 4> sizes = {};
     for (const unsigned label : classes) ++sizes[label];
-    unsigned labels = 0;
-    for (const unsigned size : sizes) labels += size > 0 ? 1 : 0;
+    const auto labels = 4 - std::ranges::count(sizes, 0U);
     if (labels == 2) add_two(classes);
     if (labels == 3) add_three(classes, sizes);
     if (labels == 4) add_four();
@@ -107,8 +101,8 @@ class TetrahedronBuilder {
             static_cast<int>(corner >> axis & 1) * 12 / static_cast<int>(sizeof...(members));
       }
     }
-    std::size_t slot = 1;
-    while (corners_of(slots[slot]) != relative) ++slot;
+    const auto slot =
+        static_cast<unsigned>(std::ranges::find(slots, relative, &Slot::set) - slots.begin());
     return {static_cast<VertexName>(owner * kSlotPlaces + slot), at};
   }
 
@@ -149,23 +143,14 @@ class TetrahedronBuilder {
   }
 
   void add_three(const std::array<unsigned, 4>& classes, const std::array<unsigned, 4>& sizes) {
-    std::array<unsigned, 2> twins = {};
-    std::array<unsigned, 2> singles = {};
-    std::size_t twins_found = 0;
-    std::size_t singles_found = 0;
-    for (unsigned i = 0; i < 4; ++i) {
-      if (sizes[classes[i]] == 2) {
-        twins[twins_found++] = i;
-      } else {
-        singles[singles_found++] = i;
-      }
-    }
-    const auto [a, a2] = twins;
-    const auto [b, c] = singles;
+    std::array<unsigned, 4> order = {0, 1, 2, 3};
+    std::stable_partition(order.begin(), order.end(),
+                          [&](unsigned i) { return sizes[classes[i]] == 2; });
+    const auto [a, a2, b, c] = order;
     const Spot face = spot(a, b, c);
     const Spot face2 = spot(a2, b, c);
     add(b, c, way(b, c), spot(b, c), face, face2);
-    for (const unsigned single : singles) {
+    for (const unsigned single : {b, c}) {
       const Point outward = plus(way(a, single), way(a2, single));
       add(a, single, outward, spot(a, single), spot(a2, single), face2);
       add(a, single, outward, spot(a, single), face2, face);
@@ -214,11 +199,9 @@ WallCases make_wall_cases(Scheme scheme, bool odd, bool left_handed) {
   WallCases cases;
   cases.slots = slots[odd ? 1 : 0];
   for (std::size_t s = 0; s < kSlots; ++s) {
-    const Slot& slot = cases.slots[s];
-    unsigned span = 0;
-    for (std::size_t i = 0; i < slot.size; ++i) span |= slot.corners[i];
+    const Corners corners = cases.slots[s].set();
     for (unsigned axes = 0; axes < 8; ++axes) {
-      if (slot.size > 0 && (span & ~axes) == 0) cases.existing[axes] |= 1U << s;
+      if (corners != 0 && (end_of(corners) & ~axes) == 0) cases.existing[axes] |= 1U << s;
     }
   }
   for (std::size_t t = 0; t < split.tetrahedra; ++t) {

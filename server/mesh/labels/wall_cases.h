@@ -33,6 +33,13 @@ inline constexpr std::size_t kSlotPlaces = 32;  // what slots are counted in, fo
 struct Slot {
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> corners = {};
+
+  // A bit for each corner.
+  unsigned set() const {
+    unsigned set = 0;
+    for (std::size_t i = 0; i < size; ++i) set |= 1U << corners[i];
+    return set;
+  }
 };
 
 // Names a vertex of a cell: the corner whose sample owns it, times kSlotPlaces, plus its slot.

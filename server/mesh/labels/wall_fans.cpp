@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -99,13 +98,9 @@ WallFans::Layer WallFans::layer_of(const SeparatingSurface& surface,
       const bool is_cap = !faces.empty() && (faces[a] & faces[b] & faces[c]) != 0;
       corners.push_back({{surface.sides[t], is_cap}, triangle[(i + 1) % 3], triangle[(i + 2) % 3]});
     }
-    const auto key_of = [](const Corner& corner) {
-      const auto& [sides, is_cap] = corner.wall;
-      return std::tuple(sides.front, sides.back, is_cap);
-    };
     const bool is_one_wall = std::ranges::all_of(
         corners, [&](const Corner& corner) { return corner.wall == corners[0].wall; });
-    if (!is_one_wall) std::ranges::stable_sort(corners, {}, key_of);
+    if (!is_one_wall) std::ranges::stable_sort(corners, {}, &Corner::wall);
     for (auto at = corners.begin(), end = at; at != corners.end(); at = end) {
       end = std::find_if(at, corners.end(),
                          [&](const Corner& corner) { return corner.wall != at->wall; });

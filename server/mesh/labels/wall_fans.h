@@ -18,7 +18,7 @@ struct Wall {
   WallSides sides;
   bool is_cap = false;
 
-  bool operator==(const Wall&) const = default;
+  auto operator<=>(const Wall&) const = default;
 };
 
 // A fan is a vertex and one of the walls that meet there; fans are numbered by vertex, so those of
