@@ -51,6 +51,14 @@ std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t sampl
   return needed + needed / kHoles;
 }
 
+// True if the windows of a walk, which overlap, and the layers that its steps keep take much more
+// than the whole surface: it has few layers.
+bool takes_more_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  const mesh::WalkOptions options = walk_options(smooth_options(parameters), parameters, surface);
+  const std::uint64_t whole = mesh_bytes(surface) + smoothing_memory(options.smooth, surface);
+  return mesh::walking_memory(options, surface, {}) > 2 * whole;
+}
+
 // The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,
 // and all labels' own surfaces.
 std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
@@ -134,10 +142,10 @@ bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameter
     return codec::is_set_aside(format, parameters);
   });
   if (is_set_aside && surface.triangles < kFewTriangles) return false;
+  if (surface.triangles >= kFewTriangles) return !takes_more_walked(surface, parameters);
   const std::uint64_t depth = walk_options({}, parameters, surface).depth;
   const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
-  return threads == 1 || depth == 0 || surface.triangles >= kFewTriangles ||
-         surface.layers >= 2 * threads * depth;
+  return threads == 1 || depth == 0 || surface.layers >= 2 * threads * depth;
 }
 
 bool removes_stairs(const MeshParameters& parameters) {
