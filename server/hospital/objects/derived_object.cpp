@@ -72,19 +72,20 @@ DataSet reference_to(std::string_view sop_class, std::string_view instance) {
   return reference;
 }
 
-DataSet derived_object(const DerivedObject& object) {
+DataSet derived_object(const DerivedObject& object, std::string_view sop_class,
+                       std::string_view modality) {
   const Moment made = moment_of(object.made);
   DataSet data;
   data.set(0x00080005, "CS", "ISO_IR 192");  // SpecificCharacterSet
   data.set(0x00080012, "DA", made.date);     // InstanceCreationDate
   data.set(0x00080013, "TM", made.time);
-  data.set(0x00080016, "UI", object.sop_class);
+  data.set(0x00080016, "UI", sop_class);
   data.set(0x00080018, "UI", object.sop_instance_uid);
   data.set(0x00080021, "DA", made.date);  // SeriesDate
   data.set(0x00080023, "DA", made.date);  // ContentDate
   data.set(0x00080031, "TM", made.time);
   data.set(0x00080033, "TM", made.time);
-  data.set(0x00080060, "CS", object.modality);
+  data.set(0x00080060, "CS", modality);
   data.set(0x0008103E, "LO", object.title);  // SeriesDescription
   data.set(0x0020000E, "UI", object.series_uid);
   data.set(0x00200011, "IS", std::to_string(object.series_number));
