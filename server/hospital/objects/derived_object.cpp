@@ -72,6 +72,21 @@ DataSet reference_to(std::string_view sop_class, std::string_view instance) {
   return reference;
 }
 
+std::vector<DataSet> references_to(const DicomIdentity& identity) {
+  std::vector<DataSet> references;
+  for (const DicomInstance& image : identity.instances) {
+    references.push_back(reference_to(image.sop_class_uid, image.sop_instance_uid));
+  }
+  return references;
+}
+
+DataSet series_item(std::string_view series_uid, const std::vector<DataSet>& references) {
+  DataSet series;
+  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
+  series.set(0x0020000E, "UI", series_uid);
+  return series;
+}
+
 DataSet derived_object(const DerivedObject& object, std::string_view sop_class,
                        std::string_view modality) {
   const Moment made = moment_of(object.made);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/hospital/objects/data_set.h"
@@ -39,5 +40,11 @@ DataSet code_item(const DicomCode& code);
 
 // An item that refers to an object.
 DataSet reference_to(std::string_view sop_class, std::string_view instance);
+
+// Such items of all images.
+std::vector<DataSet> references_to(const DicomIdentity& identity);
+
+// An item of ReferencedSeriesSequence, with references to objects of that series.
+DataSet series_item(std::string_view series_uid, const std::vector<DataSet>& references);
 
 }  // namespace isomesh::dicom

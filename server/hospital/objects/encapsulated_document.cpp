@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <utility>
 #include <vector>
 
 #include "proto/error.h"
@@ -44,24 +43,11 @@ std::optional<DicomCode> concept_of(const DocumentObject& object) {
   return std::nullopt;
 }
 
-// An item of ReferencedSeriesSequence.
-DataSet series_item(const std::string& series_uid, const std::vector<DataSet>& references) {
-  DataSet series;
-  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
-  series.set(0x0020000E, "UI", series_uid);
-  return series;
-}
-
 void add_references(const DocumentObject& object, DataSet& data) {
   const DataSet purpose = code_item({"121324", "DCM", "Source Image"});
-  std::vector<DataSet> sources;
-  std::vector<DataSet> references;
-  for (const DicomInstance& instance : object.common.identity.instances) {
-    DataSet reference = reference_to(instance.sop_class_uid, instance.sop_instance_uid);
-    references.push_back(reference);
-    reference.set_sequence(0x0040A170, {purpose});
-    sources.push_back(std::move(reference));
-  }
+  const std::vector<DataSet> references = references_to(object.common.identity);
+  std::vector<DataSet> sources = references;
+  for (DataSet& source : sources) source.set_sequence(0x0040A170, {purpose});
   data.set_sequence(0x00420013, sources);  // SourceInstanceSequence
   std::vector<DataSet> series = {series_item(object.common.identity.series_uid, references)};
   if (!object.materials_uid.empty()) {

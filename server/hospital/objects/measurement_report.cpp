@@ -238,12 +238,8 @@ DataSet group(const MeasurementReport& report, const MeasuredSurface& surface) {
 
 // The objects to which the report refers.
 DataSet evidence(const DicomIdentity& identity) {
-  std::vector<DataSet> references;
-  for (const DicomInstance& instance : identity.instances) {
-    references.push_back(reference_to(instance.sop_class_uid, instance.sop_instance_uid));
-  }
   DataSet series;
-  series.set_sequence(0x00081199, references);  // ReferencedSOPSequence
+  series.set_sequence(0x00081199, references_to(identity));  // ReferencedSOPSequence
   series.set(0x0020000E, "UI", identity.series_uid);
   DataSet study;
   study.set_sequence(0x00081115, {series});  // ReferencedSeriesSequence

@@ -169,17 +169,6 @@ void add_groups(const SegmentationObject& object, DataSet& data) {
   data.set_bytes(0x52009230, "SQ", items);
 }
 
-void add_sources(const DicomIdentity& identity, DataSet& data) {
-  std::vector<DataSet> references;
-  for (const DicomInstance& image : identity.instances) {
-    references.push_back(reference_to(image.sop_class_uid, image.sop_instance_uid));
-  }
-  DataSet series;
-  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
-  series.set(0x0020000E, "UI", identity.series_uid);
-  data.set_sequence(0x00081115, {series});  // ReferencedSeriesSequence
-}
-
 void check_size(const SegmentationObject& object) {
   if (object.frames.size() > kMostFrames) {
     throw Error(ErrorCode::kTooLarge, "the segmentation has " +
@@ -236,7 +225,9 @@ std::string segmentation_head(const SegmentationObject& object) {
     segments.push_back(segment_item(object, place));
   }
   data.set_sequence(0x00620002, segments);  // SegmentSequence
-  add_sources(object.common.identity, data);
+  const DicomIdentity& identity = object.common.identity;
+  data.set_sequence(0x00081115,  // ReferencedSeriesSequence
+                    {series_item(identity.series_uid, references_to(identity))});
   add_dimensions(object, data);
   add_groups(object, data);
   return file_head(kSegmentationStorage, object.common.sop_instance_uid, kExplicitLittleEndian) +
