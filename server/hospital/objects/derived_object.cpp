@@ -72,19 +72,35 @@ DataSet reference_to(std::string_view sop_class, std::string_view instance) {
   return reference;
 }
 
-DataSet derived_object(const DerivedObject& object) {
+std::vector<DataSet> references_to(const DicomIdentity& identity) {
+  std::vector<DataSet> references;
+  for (const DicomInstance& image : identity.instances) {
+    references.push_back(reference_to(image.sop_class_uid, image.sop_instance_uid));
+  }
+  return references;
+}
+
+DataSet series_item(std::string_view series_uid, const std::vector<DataSet>& references) {
+  DataSet series;
+  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
+  series.set(0x0020000E, "UI", series_uid);
+  return series;
+}
+
+DataSet derived_object(const DerivedObject& object, std::string_view sop_class,
+                       std::string_view modality) {
   const Moment made = moment_of(object.made);
   DataSet data;
   data.set(0x00080005, "CS", "ISO_IR 192");  // SpecificCharacterSet
   data.set(0x00080012, "DA", made.date);     // InstanceCreationDate
   data.set(0x00080013, "TM", made.time);
-  data.set(0x00080016, "UI", object.sop_class);
+  data.set(0x00080016, "UI", sop_class);
   data.set(0x00080018, "UI", object.sop_instance_uid);
   data.set(0x00080021, "DA", made.date);  // SeriesDate
   data.set(0x00080023, "DA", made.date);  // ContentDate
   data.set(0x00080031, "TM", made.time);
   data.set(0x00080033, "TM", made.time);
-  data.set(0x00080060, "CS", object.modality);
+  data.set(0x00080060, "CS", modality);
   data.set(0x0008103E, "LO", object.title);  // SeriesDescription
   data.set(0x0020000E, "UI", object.series_uid);
   data.set(0x00200011, "IS", std::to_string(object.series_number));

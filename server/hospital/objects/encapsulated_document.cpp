@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <utility>
 #include <vector>
 
 #include "proto/error.h"
@@ -37,36 +36,23 @@ const KindRow& row_of(DocumentKind kind) {
 // 7061).
 std::optional<DicomCode> concept_of(const DocumentObject& object) {
   if (object.segment && !object.segment->type.value.empty()) return object.segment->type;
-  const std::string& modality = object.identity.modality;
+  const std::string& modality = object.common.identity.modality;
   if (modality == "CT") return DicomCode{"85040-4", "LN", "CT 3D CAM model"};
   if (modality == "MR") return DicomCode{"85041-2", "LN", "MR 3D CAM model"};
   if (modality == "US") return DicomCode{"129018", "DCM", "Ultrasound 3D CAM model"};
   return std::nullopt;
 }
 
-// An item of ReferencedSeriesSequence.
-DataSet series_item(const std::string& series_uid, const std::vector<DataSet>& references) {
-  DataSet series;
-  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
-  series.set(0x0020000E, "UI", series_uid);
-  return series;
-}
-
 void add_references(const DocumentObject& object, DataSet& data) {
   const DataSet purpose = code_item({"121324", "DCM", "Source Image"});
-  std::vector<DataSet> sources;
-  std::vector<DataSet> references;
-  for (const DicomInstance& instance : object.identity.instances) {
-    DataSet reference = reference_to(instance.sop_class_uid, instance.sop_instance_uid);
-    references.push_back(reference);
-    reference.set_sequence(0x0040A170, {purpose});
-    sources.push_back(std::move(reference));
-  }
+  const std::vector<DataSet> references = references_to(object.common.identity);
+  std::vector<DataSet> sources = references;
+  for (DataSet& source : sources) source.set_sequence(0x0040A170, {purpose});
   data.set_sequence(0x00420013, sources);  // SourceInstanceSequence
-  std::vector<DataSet> series = {series_item(object.identity.series_uid, references)};
+  std::vector<DataSet> series = {series_item(object.common.identity.series_uid, references)};
   if (!object.materials_uid.empty()) {
     DataSet materials = reference_to(sop_class_of(DocumentKind::kMtl), object.materials_uid);
-    series.push_back(series_item(object.series_uid, {materials}));
+    series.push_back(series_item(object.common.series_uid, {materials}));
     materials.set(0x00687005, "UR",
                   kMaterialsName);               // RelativeURIReferenceWithinEncapsulatedDocument
     data.set_sequence(0x0008114A, {materials});  // ReferencedInstanceSequence
@@ -75,10 +61,10 @@ void add_references(const DocumentObject& object, DataSet& data) {
 }
 
 void add_document(const DocumentObject& object, std::uint64_t bytes, DataSet& data) {
-  data.set(0x0008002A, "DT", object.identity.acquisition_datetime);
-  data.set(0x00280301, "CS", "NO");          // BurnedInAnnotation
-  data.set(0x00280302, "CS", "YES");         // RecognizableVisualFeatures
-  data.set(0x00420010, "ST", object.title);  // DocumentTitle
+  data.set(0x0008002A, "DT", object.common.identity.acquisition_datetime);
+  data.set(0x00280301, "CS", "NO");                 // BurnedInAnnotation
+  data.set(0x00280302, "CS", "YES");                // RecognizableVisualFeatures
+  data.set(0x00420010, "ST", object.common.title);  // DocumentTitle
   const auto concept_name = concept_of(object);
   data.set_sequence(0x0040A043,
                     concept_name ? std::vector{code_item(*concept_name)} : std::vector<DataSet>());
@@ -122,22 +108,13 @@ Envelope make_envelope(const DocumentObject& object, std::uint64_t document_byte
                                           ". Set \"triangles\" to simplify it.");
   }
   const std::string_view sop_class = sop_class_of(object.kind);
-  DataSet data = derived_object({.identity = object.identity,
-                                 .sop_class = sop_class,
-                                 .sop_instance_uid = object.sop_instance_uid,
-                                 .modality = "M3D",
-                                 .series_uid = object.series_uid,
-                                 .series_number = object.series_number,
-                                 .instance_number = object.instance_number,
-                                 .title = object.title,
-                                 .made = object.made,
-                                 .station_name = object.station_name});
-  add_frame_of_reference(object.identity, data);
+  DataSet data = derived_object(object.common, sop_class, "M3D");
+  add_frame_of_reference(object.common.identity, data);
   add_references(object, data);
   add_document(object, document_bytes, data);
   add_model(object, data);
   const auto padded = static_cast<std::uint32_t>(document_bytes + document_bytes % 2);
-  return {.before = file_head(sop_class, object.sop_instance_uid, kExplicitLittleEndian) +
+  return {.before = file_head(sop_class, object.common.sop_instance_uid, kExplicitLittleEndian) +
                     data.bytes_before(kEncapsulatedDocument) +
                     element_head(kEncapsulatedDocument, "OB", padded),
           .after = std::string(document_bytes % 2, '\0') + data.bytes_after(kEncapsulatedDocument)};

@@ -2,7 +2,6 @@
 // study that it was made from.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -12,6 +11,7 @@
 #include <string_view>
 
 #include "proto/types.h"
+#include "server/hospital/objects/derived_object.h"
 
 namespace isomesh::dicom {
 
@@ -33,14 +33,7 @@ inline constexpr std::uint64_t kMostDocumentBytes = 4'294'967'294;
 // The attributes of the object besides its document. Texts are UTF-8.
 struct DocumentObject {
   DocumentKind kind = DocumentKind::kStl;
-  const DicomIdentity& identity;  // of the images
-  std::string series_uid;
-  std::string sop_instance_uid;
-  std::int64_t series_number = 0;
-  std::int64_t instance_number = 1;
-  std::string title;  // of the series and the document
-  std::chrono::system_clock::time_point made;
-  std::string station_name;
+  DerivedObject common;              // the title is the document's, too
   std::string content_description;   // one sentence: iso-value, scheme, passes
   std::string algorithm_parameters;  // JSON
   // The segment of the mesh; empty for a mesh at an iso-value, and for several segments.

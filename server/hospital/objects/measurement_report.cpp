@@ -146,7 +146,7 @@ DataSet image(const char* relation, const std::optional<DicomCode>& name,
 
 // The segmentation of which the labels are segments, if that can be referred to.
 const DicomInstance* segmentation_of(const MeasurementReport& report) {
-  const DicomIdentity& identity = report.identity;
+  const DicomIdentity& identity = report.common.identity;
   const bool is_one = identity.instances.size() == 1 &&
                       identity.instances.front().sop_class_uid == kSegmentationStorage &&
                       !report.segmented_series_uid.empty();
@@ -159,8 +159,8 @@ bool is_coded(const DicomCode& code) { return !code.value.empty() && !code.schem
 void add_observer(const MeasurementReport& report, std::vector<DataSet>& children) {
   children.push_back(code(kHasContext, kObserverType, kDevice));
   children.push_back(
-      uid(kHasContext, kObserverUid, name_based_uid("device\n" + report.station_name)));
-  children.push_back(text(kHasContext, kObserverName, report.station_name));
+      uid(kHasContext, kObserverUid, name_based_uid("device\n" + report.common.station_name)));
+  children.push_back(text(kHasContext, kObserverName, report.common.station_name));
   children.push_back(text(kHasContext, kObserverMaker, "isomesh"));
   children.push_back(text(kHasContext, kObserverModel, "isomeshd"));
 }
@@ -211,7 +211,7 @@ void add_measurements(const MeasurementReport& report, const MeasuredSurface& su
 }
 
 DataSet group(const MeasurementReport& report, const MeasuredSurface& surface) {
-  const DicomIdentity& identity = report.identity;
+  const DicomIdentity& identity = report.common.identity;
   const std::string what = surface.label ? "label " + std::to_string(*surface.label) : "surface";
   std::vector<DataSet> children = {text(kHasContext, kTrackingName, surface.name),
                                    uid(kHasContext, kTrackingUid,
@@ -238,12 +238,8 @@ DataSet group(const MeasurementReport& report, const MeasuredSurface& surface) {
 
 // The objects to which the report refers.
 DataSet evidence(const DicomIdentity& identity) {
-  std::vector<DataSet> references;
-  for (const DicomInstance& instance : identity.instances) {
-    references.push_back(reference_to(instance.sop_class_uid, instance.sop_instance_uid));
-  }
   DataSet series;
-  series.set_sequence(0x00081199, references);  // ReferencedSOPSequence
+  series.set_sequence(0x00081199, references_to(identity));  // ReferencedSOPSequence
   series.set(0x0020000E, "UI", identity.series_uid);
   DataSet study;
   study.set_sequence(0x00081115, {series});  // ReferencedSeriesSequence
@@ -258,7 +254,7 @@ void add_content(const MeasurementReport& report, DataSet& data) {
   std::vector<DataSet> groups;
   for (const MeasuredSurface& surface : report.surfaces) groups.push_back(group(report, surface));
   if (segmentation_of(report) == nullptr) {
-    children.push_back(image_library(report.identity));
+    children.push_back(image_library(report.common.identity));
   }
   children.push_back(container(kMeasurements, groups));
   data.set(0x0040A040, "CS", "CONTAINER");
@@ -269,22 +265,14 @@ void add_content(const MeasurementReport& report, DataSet& data) {
 }  // namespace
 
 std::string make_report(const MeasurementReport& report) {
-  DataSet data = derived_object({.identity = report.identity,
-                                 .sop_class = kEnhancedSrStorage,
-                                 .sop_instance_uid = report.sop_instance_uid,
-                                 .modality = "SR",
-                                 .series_uid = report.series_uid,
-                                 .series_number = report.series_number,
-                                 .title = report.title,
-                                 .made = report.made,
-                                 .station_name = report.station_name});
+  DataSet data = derived_object(report.common, kEnhancedSrStorage, "SR");
   data.set_sequence(0x00081111, {});         // ReferencedPerformedProcedureStepSequence
   data.set_sequence(0x0040A372, {});         // PerformedProcedureCodeSequence
   data.set(0x0040A491, "CS", "COMPLETE");    // CompletionFlag
   data.set(0x0040A493, "CS", "UNVERIFIED");  // VerificationFlag
-  data.set_sequence(0x0040A375, {evidence(report.identity)});  // of the requested procedure
+  data.set_sequence(0x0040A375, {evidence(report.common.identity)});  // of the requested procedure
   add_content(report, data);
-  return file_head(kEnhancedSrStorage, report.sop_instance_uid, kExplicitLittleEndian) +
+  return file_head(kEnhancedSrStorage, report.common.sop_instance_uid, kExplicitLittleEndian) +
          data.bytes();
 }
 

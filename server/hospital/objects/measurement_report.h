@@ -2,7 +2,6 @@
 // templates of a Measurement Report (PS3.16, TID 1500).
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "proto/types.h"
+#include "server/hospital/objects/derived_object.h"
 
 namespace isomesh::dicom {
 
@@ -32,15 +32,9 @@ struct Deviation {
 };
 
 struct MeasurementReport {
-  const DicomIdentity& identity;          // of the images
+  DerivedObject common;
   std::string segmented_series_uid = {};  // of a segmentation: the series of its images, if known
-  std::string series_uid;
-  std::string sop_instance_uid;
-  std::int64_t series_number = 0;
-  std::string title;
-  std::chrono::system_clock::time_point made;
-  std::string station_name;
-  std::string algorithm_parameters;  // JSON
+  std::string algorithm_parameters;       // JSON
   std::optional<Deviation> deviation = {};
   std::vector<MeasuredSurface> surfaces = {};
 };

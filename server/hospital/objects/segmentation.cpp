@@ -53,17 +53,17 @@ void add_pixel_description(const SegmentationObject& object, DataSet& data) {
   set_short(data, 0x00280002, 1);                  // SamplesPerPixel
   data.set(0x00280004, "CS", "MONOCHROME2");       // PhotometricInterpretation
   data.set(0x00280008, "IS", std::to_string(object.frames.size()));
-  set_short(data, 0x00280010, object.dims[1]);  // Rows
-  set_short(data, 0x00280011, object.dims[0]);  // Columns
-  set_short(data, 0x00280100, 1);               // BitsAllocated
-  set_short(data, 0x00280101, 1);               // BitsStored
-  set_short(data, 0x00280102, 0);               // HighBit
-  set_short(data, 0x00280103, 0);               // PixelRepresentation
-  data.set(0x00282110, "CS", "00");             // LossyImageCompression
-  data.set(0x00620001, "CS", "BINARY");         // SegmentationType
-  data.set(0x00700080, "CS", "SEGMENTATION");   // ContentLabel
-  data.set(0x00700081, "LO", object.title);     // ContentDescription
-  data.set(0x00700084, "PN", "");               // ContentCreatorName
+  set_short(data, 0x00280010, object.dims[1]);      // Rows
+  set_short(data, 0x00280011, object.dims[0]);      // Columns
+  set_short(data, 0x00280100, 1);                   // BitsAllocated
+  set_short(data, 0x00280101, 1);                   // BitsStored
+  set_short(data, 0x00280102, 0);                   // HighBit
+  set_short(data, 0x00280103, 0);                   // PixelRepresentation
+  data.set(0x00282110, "CS", "00");                 // LossyImageCompression
+  data.set(0x00620001, "CS", "BINARY");             // SegmentationType
+  data.set(0x00700080, "CS", "SEGMENTATION");       // ContentLabel
+  data.set(0x00700081, "LO", object.common.title);  // ContentDescription
+  data.set(0x00700084, "PN", "");                   // ContentCreatorName
 }
 
 DataSet segment_item(const SegmentationObject& object, std::size_t place) {
@@ -76,7 +76,7 @@ DataSet segment_item(const SegmentationObject& object, std::size_t place) {
   item.set(0x00620005, "LO", segment.name);                              // SegmentLabel
   item.set(0x00620006, "ST", "label " + std::to_string(segment.label));  // SegmentDescription
   item.set(0x00620008, "CS", "AUTOMATIC");                               // SegmentAlgorithmType
-  item.set(0x00620009, "LO", object.title);                              // SegmentAlgorithmName
+  item.set(0x00620009, "LO", object.common.title);                       // SegmentAlgorithmName
   if (segment.color) {
     std::string lab;
     for (const std::uint16_t part : cielab_of(*segment.color)) lab += little_endian(part, 2);
@@ -87,7 +87,7 @@ DataSet segment_item(const SegmentationObject& object, std::size_t place) {
 }
 
 void add_dimensions(const SegmentationObject& object, DataSet& data) {
-  const std::string organization = name_based_uid("dimensions\n" + object.sop_instance_uid);
+  const std::string organization = name_based_uid("dimensions\n" + object.common.sop_instance_uid);
   const auto index = [&](Tag pointer, Tag group) {
     const auto tag_bytes = [](Tag tag) {
       return little_endian(tag >> 16, 2) + little_endian(tag & 0xffff, 2);
@@ -131,7 +131,7 @@ DataSet shared_groups(const SegmentationObject& object) {
 }
 
 DataSet groups_of(const SegmentationObject& object, const SegmentationFrame& frame) {
-  const DicomInstance& image = object.identity.instances[frame.slice];
+  const DicomInstance& image = object.common.identity.instances[frame.slice];
   DataSet source = reference_to(image.sop_class_uid, image.sop_instance_uid);
   source.set(0x0028135A, "CS", "YES");  // SpatialLocationsPreserved
   source.set_sequence(
@@ -167,17 +167,6 @@ void add_groups(const SegmentationObject& object, DataSet& data) {
     DataSet::append_item(groups_of(object, frame), items);
   }
   data.set_bytes(0x52009230, "SQ", items);
-}
-
-void add_sources(const DicomIdentity& identity, DataSet& data) {
-  std::vector<DataSet> references;
-  for (const DicomInstance& image : identity.instances) {
-    references.push_back(reference_to(image.sop_class_uid, image.sop_instance_uid));
-  }
-  DataSet series;
-  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
-  series.set(0x0020000E, "UI", identity.series_uid);
-  data.set_sequence(0x00081115, {series});  // ReferencedSeriesSequence
 }
 
 void check_size(const SegmentationObject& object) {
@@ -228,26 +217,20 @@ std::array<std::uint16_t, 3> cielab_of(std::string_view color) {
 
 std::string segmentation_head(const SegmentationObject& object) {
   check_size(object);
-  DataSet data = derived_object({.identity = object.identity,
-                                 .sop_class = kSegmentationStorage,
-                                 .sop_instance_uid = object.sop_instance_uid,
-                                 .modality = "SEG",
-                                 .series_uid = object.series_uid,
-                                 .series_number = object.series_number,
-                                 .title = object.title,
-                                 .made = object.made,
-                                 .station_name = object.station_name});
-  add_frame_of_reference(object.identity, data);
+  DataSet data = derived_object(object.common, kSegmentationStorage, "SEG");
+  add_frame_of_reference(object.common.identity, data);
   add_pixel_description(object, data);
   std::vector<DataSet> segments;
   for (std::size_t place = 0; place < object.segments.size(); ++place) {
     segments.push_back(segment_item(object, place));
   }
   data.set_sequence(0x00620002, segments);  // SegmentSequence
-  add_sources(object.identity, data);
+  const DicomIdentity& identity = object.common.identity;
+  data.set_sequence(0x00081115,  // ReferencedSeriesSequence
+                    {series_item(identity.series_uid, references_to(identity))});
   add_dimensions(object, data);
   add_groups(object, data);
-  return file_head(kSegmentationStorage, object.sop_instance_uid, kExplicitLittleEndian) +
+  return file_head(kSegmentationStorage, object.common.sop_instance_uid, kExplicitLittleEndian) +
          data.bytes() +
          element_head(kPixelData, "OB",
                       static_cast<std::uint32_t>(segmentation_pixel_bytes(object)));

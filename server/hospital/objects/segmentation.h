@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "proto/types.h"
+#include "server/hospital/objects/derived_object.h"
 
 namespace isomesh::dicom {
 
@@ -28,13 +28,7 @@ struct SegmentationFrame {
 };
 
 struct SegmentationObject {
-  const DicomIdentity& identity;  // of the images: an instance for each slice
-  std::string series_uid;
-  std::string sop_instance_uid;
-  std::int64_t series_number = 0;
-  std::string title;
-  std::chrono::system_clock::time_point made;
-  std::string station_name;
+  DerivedObject common;                             // the images have an instance for each slice
   std::array<std::uint32_t, 3> dims = {0, 0, 0};    // columns, rows, slices
   std::array<double, 3> origin = {0, 0, 0};         // LPS, in mm
   std::array<std::array<double, 3>, 3> steps = {};  // along columns, rows, slices

@@ -197,6 +197,17 @@ std::vector<Document> documents_of(const store::OrderRecord& record, const Job& 
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
 
+dicom::DerivedObject common_of(const store::OrderRecord& record, const Making& making,
+                               const MadeObject& object, const std::string& title) {
+  return {.identity = record.work.identity.value(),
+          .sop_instance_uid = object.sop_instance_uid,
+          .series_uid = object.series_uid,
+          .series_number = record.work.series_number.value_or(0),
+          .title = in_short(without_backslashes(title)),
+          .made = making.made,
+          .station_name = making.station_name};
+}
+
 // Also sets the UIDs of `object`.
 dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
                             const Document& document, const Making& making, MadeObject& object) {
@@ -208,15 +219,10 @@ dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
   object.sop_instance_uid = instance_uid_of(object, identity, document.sha256);
   const std::string title =
       document.label ? record.work.label + ' ' + document.name : record.work.label;
+  dicom::DerivedObject common = common_of(record, making, object, title);
+  common.instance_number = document.number;
   return dicom::make_envelope({.kind = document.kind,
-                               .identity = identity,
-                               .series_uid = object.series_uid,
-                               .sop_instance_uid = object.sop_instance_uid,
-                               .series_number = record.work.series_number.value_or(0),
-                               .instance_number = document.number,
-                               .title = in_short(without_backslashes(title)),
-                               .made = making.made,
-                               .station_name = making.station_name,
+                               .common = std::move(common),
                                .content_description = description_of(job),
                                .algorithm_parameters = without_backslashes(
                                    canonical_parameters(job.parameters, document.format)),
@@ -239,21 +245,14 @@ std::string report_of(const store::OrderRecord& record, const Job& job, const Ma
   object.format = SendFormat::kSr;
   object.sop_class_uid = dicom::kEnhancedSrStorage;
   object.series_uid = series_uid_of(identity, job, making, object.format);
-  dicom::MeasurementReport report = {
-      .identity = identity,
-      .segmented_series_uid = record.work.segmented_series,
-      .series_uid = object.series_uid,
-      .sop_instance_uid = {},
-      .series_number = record.work.series_number.value_or(0),
-      .title = in_short(without_backslashes(record.work.label)),
-      .made = making.made,
-      .station_name = making.station_name,
-      .algorithm_parameters = canonical_parameters(job.parameters, object.format),
-      .deviation = deviation_of(job),
-      .surfaces = measure_surfaces(job, identity, record.work.label, blobs, making.stop)};
-  object.sop_instance_uid = instance_uid_of(object, identity, text_of(report.surfaces));
-  report.sop_instance_uid = object.sop_instance_uid;
-  return dicom::make_report(report);
+  auto surfaces = measure_surfaces(job, identity, record.work.label, blobs, making.stop);
+  object.sop_instance_uid = instance_uid_of(object, identity, text_of(surfaces));
+  return dicom::make_report(
+      {.common = common_of(record, making, object, record.work.label),
+       .segmented_series_uid = record.work.segmented_series,
+       .algorithm_parameters = canonical_parameters(job.parameters, object.format),
+       .deviation = deviation_of(job),
+       .surfaces = std::move(surfaces)});
 }
 
 [[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
@@ -286,13 +285,7 @@ dicom::SegmentationObject segmentation_of(const store::OrderRecord& record, cons
   object.sop_class_uid = dicom::kSegmentationStorage;
   object.series_uid = series_uid_of(identity, job, making, object.format);
   object.sop_instance_uid = instance_uid_of(object, identity, content);
-  return {.identity = identity,
-          .series_uid = object.series_uid,
-          .sop_instance_uid = object.sop_instance_uid,
-          .series_number = record.work.series_number.value_or(0),
-          .title = in_short(without_backslashes(record.work.label)),
-          .made = making.made,
-          .station_name = making.station_name,
+  return {.common = common_of(record, making, object, record.work.label),
           .dims = grid.dims,
           .origin = grid.origin,
           .steps = grid.steps,

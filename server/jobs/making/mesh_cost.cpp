@@ -23,23 +23,29 @@ std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
   return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle);
 }
 
+// With the room that arrays grow into.
+constexpr std::uint64_t kJoinedPerVertex = 16;
+
+mesh::WritingMemory writing_memory(std::uint64_t samples, const mesh::SurfaceSize& surface,
+                                   const MeshParameters& parameters) {
+  return mesh::writing_memory(
+      {.scheme = scheme_of(parameters.scheme), .regularize = is_regularized(parameters)},
+      samples / std::max<std::uint64_t>(1, surface.layers));
+}
+
 // The memory of a job that never has the surface as a whole: the walk, its files, the joined
 // crossings if they are not set aside, and for each thread the topology of a window.
 std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                            const MeshParameters& parameters) {
-  // With the room that arrays grow into.
-  constexpr std::uint64_t kJoinedPerVertex = 16;
   // Measured: what the C library keeps of freed blocks takes up to a third of those in use, with
   // the surfaces whose bounds here are the closest; a fifth of the bounds covers it.
   constexpr std::uint64_t kHoles = 5;
-  const std::uint64_t plane = samples / std::max<std::uint64_t>(1, surface.layers);
   const bool is_set_aside = sets_aside(samples);
   std::uint64_t files = 0;
   for (const MeshFormat format : files_of(parameters)) {
     files += codec::walked_memory(format, parameters, surface, is_set_aside);
   }
-  mesh::WritingMemory writing = mesh::writing_memory(
-      {.scheme = scheme_of(parameters.scheme), .regularize = is_regularized(parameters)}, plane);
+  mesh::WritingMemory writing = writing_memory(samples, surface, parameters);
   if (!is_set_aside) writing.vertex_bytes = 0;
   const std::uint64_t joined = parameters.regularize && !is_set_aside ? surface.vertices : 0;
   const mesh::WalkOptions options = walk_options(smooth_options(parameters), parameters, surface);
@@ -49,6 +55,14 @@ std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t sampl
   const std::uint64_t needed = mesh::walking_memory(options, surface, writing) + files +
                                joined * kJoinedPerVertex + topology;
   return needed + needed / kHoles;
+}
+
+// True if the windows of a walk, which overlap, and the layers that its steps keep take much more
+// than the whole surface: it has few layers.
+bool takes_more_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  const mesh::WalkOptions options = walk_options(smooth_options(parameters), parameters, surface);
+  const std::uint64_t whole = mesh_bytes(surface) + smoothing_memory(options.smooth, surface);
+  return mesh::walking_memory(options, surface, {}) > 2 * whole;
 }
 
 // The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,
@@ -134,10 +148,10 @@ bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameter
     return codec::is_set_aside(format, parameters);
   });
   if (is_set_aside && surface.triangles < kFewTriangles) return false;
+  if (surface.triangles >= kFewTriangles) return !takes_more_walked(surface, parameters);
   const std::uint64_t depth = walk_options({}, parameters, surface).depth;
   const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
-  return threads == 1 || depth == 0 || surface.triangles >= kFewTriangles ||
-         surface.layers >= 2 * threads * depth;
+  return threads == 1 || depth == 0 || surface.layers >= 2 * threads * depth;
 }
 
 bool removes_stairs(const MeshParameters& parameters) {
@@ -178,9 +192,14 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t sa
   const std::uint64_t smoothing = removes_stairs(parameters)
                                       ? mesh::stairs_memory(surface)
                                       : smoothing_memory(smooth_options(parameters), surface);
-  return mesh_bytes(surface) + smoothing +
-         (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding) +
-         error_bytes(surface, samples, parameters, measures);
+  const std::uint64_t made = smoothing + (parameters.labels ? 2 * encoding : encoding) +
+                             error_bytes(surface, samples, parameters, measures);
+  if (parameters.labels) return mesh_bytes(surface) + label_bytes(surface) + made;
+  // The C library keeps what the joined crossings took, in small blocks.
+  const std::uint64_t joined = is_regularized(parameters) ? surface.vertices * kJoinedPerVertex : 0;
+  const std::uint64_t writing = static_cast<std::uint64_t>(mesh::thread_count()) *
+                                writing_memory(samples, surface, parameters).thread_bytes;
+  return mesh_bytes(surface) + joined + std::max(writing, made);
 }
 
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,

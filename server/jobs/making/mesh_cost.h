@@ -26,8 +26,8 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 bool can_be_walked(const MeshParameters& parameters, const Measures& measures);
 
 // True if such a job is made so. A small surface of few windows would not keep all threads busy,
-// and one whose file is set aside first would take longer: it is made as a whole, which gives the
-// same.
+// one whose file is set aside first would take longer, and a large one of few layers would take
+// more memory: it is made as a whole, which gives the same.
 bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
                const Measures& measures);
 

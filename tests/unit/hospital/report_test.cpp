@@ -17,14 +17,14 @@ using testing::Not;
 class ReportTest : public testing::Test {
  protected:
   std::string made() {
-    return make_report({.identity = identity_,
+    return make_report({.common = {.identity = identity_,
+                                   .sop_instance_uid = "2.25.2",
+                                   .series_uid = "2.25.1",
+                                   .series_number = 9001,
+                                   .title = "Bone",
+                                   .made = {},
+                                   .station_name = "here"},
                         .segmented_series_uid = segmented_series_,
-                        .series_uid = "2.25.1",
-                        .sop_instance_uid = "2.25.2",
-                        .series_number = 9001,
-                        .title = "Bone",
-                        .made = {},
-                        .station_name = "here",
                         .algorithm_parameters = "{}",
                         .deviation = deviation_,
                         .surfaces = {surface_}});

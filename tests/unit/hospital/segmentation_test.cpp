@@ -135,12 +135,12 @@ TEST(SegmentationHead, DescribesSegmentsAndFrames) {
   identity.instances = {{"1.2.840.10008.5.1.4.1.1.2", "1.5.1"},
                         {"1.2.840.10008.5.1.4.1.1.2", "1.5.2"}};
   dicom::SegmentationObject object = {
-      .identity = identity,
-      .series_uid = "2.25.1",
-      .sop_instance_uid = "2.25.2",
-      .title = "Organs",
-      .made = {},
-      .station_name = "here",
+      .common = {.identity = identity,
+                 .sop_instance_uid = "2.25.2",
+                 .series_uid = "2.25.1",
+                 .title = "Organs",
+                 .made = {},
+                 .station_name = "here"},
       .dims = kSizes,
       .origin = kImages.origin,
       .steps = {{{1, 0, 0}, {0, 2, 0}, {0, 0, 3}}},

@@ -110,6 +110,20 @@ TEST(IsWalked, UnlessASmallSurfaceHasTooFewWindowsForTheThreads) {
   }
 }
 
+// Large slices of a microscope.
+TEST(IsWalked, UnlessAFewLargeLayersTakeLessAsAWhole) {
+  const mesh::SurfaceSize few = test::even_surface(3, 1'000'000, 2'000'000);
+  const mesh::SurfaceSize many = test::even_surface(300, 10'000, 20'000);
+  MeshParameters parameters;
+  parameters.passes = 20;
+  const test::ThreadCount two(2);
+  for (const MeshFormat format : {MeshFormat::kGlb, MeshFormat::kStl}) {
+    parameters.formats = {format};
+    EXPECT_FALSE(is_walked(few, parameters, {}));
+    EXPECT_TRUE(is_walked(many, parameters, {}));
+  }
+}
+
 TEST(EstimateMemory, FollowsTheLayerOfAWalk) {
   MeshParameters parameters;
   parameters.formats = {MeshFormat::kStl, MeshFormat::kGlb};

@@ -1,4 +1,4 @@
-// The memory of jobs whose files are written while the surface is walked through.
+// The memory of jobs, most of whose files are written while the surface is walked through.
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -89,7 +89,8 @@ Memory memory_of(const std::vector<std::uint8_t>& samples, const MeshParameters&
                          .measures = {},
                          .memory_bytes = std::uint64_t{1} << 40};
   const mesh::SurfaceSize surface = count_surface(array, request, {}).size;
-  EXPECT_TRUE(sets_aside(samples.size()) && is_walked(surface, parameters, {}));
+  EXPECT_TRUE(sets_aside(samples.size()));
+  EXPECT_EQ(is_walked(surface, parameters, {}), parameters.formats.front() != MeshFormat::kPly);
   Memory memory = {.estimated = estimate_memory(surface, samples.size(), parameters, {})};
   Peak peak;
   WatchedSpool spool(folder.path(), peak);
@@ -132,6 +133,9 @@ TEST(EstimateMemory, IsCloseToWhatTheBodyCentredLatticeTakes) {
 }
 
 TEST(EstimateMemory, IsCloseToWhatAGlbTakes) { expect_close(parameters_for(MeshFormat::kGlb, 5)); }
+
+// The crossings are joined beside the whole surface.
+TEST(EstimateMemory, IsCloseToWhatAPlyTakes) { expect_close(parameters_for(MeshFormat::kPly, 0)); }
 
 TEST(WalkMemory, IsTheSameForTwiceAsManyLayers) {
   const test::ThreadCount one(1);
