@@ -45,10 +45,10 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   const auto lane = [&](std::size_t axis) {
     return static_cast<float>(samples[axis] - 1 + beyond);
   };
-  const Lanes first = static_cast<float>(-beyond) * spacing_;
-  const Lanes last = Lanes{lane(0), lane(1), lane(2), 0} * spacing_;
-  low_ = smaller(first, last);
-  high_ = larger(first, last);
+  const Lanes near = static_cast<float>(-beyond) * spacing_;
+  const Lanes far = Lanes{lane(0), lane(1), lane(2), 0} * spacing_;
+  low_ = smaller(near, far);
+  high_ = larger(near, far);
   for_each(context, mesh.positions.size(), [&](std::size_t v) {
     constexpr double kNear = 1e-3;  // as single precision leaves it, far from the origin
     const auto index = index_of(to_space, to_point(mesh.positions[v]));
