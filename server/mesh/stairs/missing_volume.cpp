@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "server/mesh/extract/links.h"
-#include "server/mesh/labels/label_index.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
@@ -49,6 +48,11 @@ class VoxelShares {
         }
       }
     }
+    if (scheme != Scheme::kSix) return;
+    whole_.resize(std::size_t{1} << links_.directions().size());
+    for (std::size_t set = 0; set < whole_.size(); ++set) {
+      whole_[set] = sum_of(corners_[0], static_cast<Directions>(set));
+    }
   }
 
   // Where the owner is, by axis.
@@ -60,11 +64,8 @@ class VoxelShares {
 
   // All that such a sample is owed by the wall around it, for its crossings in some directions.
   float of_whole(const VertexOwner& owner) const {
-    float sum = 0;
-    for (const CornerShare& corner : around(owner)) {
-      sum += (corner.others & owner.directions) != 0 ? corner.share : 0;
-    }
-    return sum;
+    const auto directions = static_cast<Directions>(owner.directions);
+    return whole_.empty() ? sum_of(around(owner), directions) : whole_[directions];
   }
 
   // Calls give(fan, voxels) for those fans of a vertex whose walls owe its owner something.
@@ -82,6 +83,14 @@ class VoxelShares {
   }
 
  private:
+  static float sum_of(std::span<const CornerShare> corners, Directions directions) {
+    float sum = 0;
+    for (const CornerShare& corner : corners) {
+      sum += (corner.others & directions) != 0 ? corner.share : 0;
+    }
+    return sum;
+  }
+
   std::span<const CornerShare> around(const VertexOwner& owner) const {
     if (scheme_ == Scheme::kSix) return corners_[0];  // alike around each sample
     const auto [x, y, z] = index(owner);
@@ -94,19 +103,17 @@ class VoxelShares {
     const Dims& dims = parts_.dims();
     const auto index_of_owner = index(owner);
     const std::array<std::uint64_t, 3> samples = {dims.x, dims.y, dims.z};
-    const std::array<std::int64_t, 3> strides = {1, dims.x, std::int64_t{dims.x} * dims.y};
     Directions outside = 0;
     for (std::size_t d = 0; d < links_.directions().size(); ++d) {
-      const auto& step = links_.directions()[d].step;
-      std::int64_t way = 0;
+      std::uint64_t sample = 0;
       bool is_inside = true;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        way += step[axis] * strides[axis];
-        const std::uint64_t to =
-            index_of_owner[axis] + static_cast<std::uint64_t>(std::int64_t{step[axis]});
+      for (std::size_t axis = 3; axis-- > 0;) {
+        const std::int64_t step = links_.directions()[d].step[axis];
+        const std::uint64_t to = index_of_owner[axis] + static_cast<std::uint64_t>(step);
         is_inside = is_inside && to < samples[axis];  // -1 wraps around
+        sample = sample * samples[axis] + to;
       }
-      labels[d] = is_inside ? parts_.part(owner.sample + static_cast<std::uint64_t>(way)) : 0;
+      labels[d] = is_inside ? parts_.part(sample) : 0;
       if (!is_inside) outside |= Directions{1} << d;
     }
     return outside;
@@ -178,6 +185,7 @@ class VoxelShares {
   const Links& links_;
   const bool closed_;
   std::array<std::vector<CornerShare>, 2> corners_;  // by parity
+  std::vector<float> whole_;  // by set of directions, where all samples are alike
 };
 
 // The volume that a fan's part of its triangles sweeps between two places of their vertices: the
@@ -205,11 +213,9 @@ float swept(const WallFans& fans, std::size_t fan, const Buffer<Lanes>& from,
 
 }  // namespace
 
-template <class T>
-Buffer<float> missing_volume(const Lattice<T>& lattice, Scheme scheme,
+Buffer<float> missing_volume(const SampleParts& parts, Scheme scheme,
                              const SeparatingSurface& surface, const WallShape& shape,
                              const Context& context) {
-  const PartsOf<T> parts(lattice, surface.parts);
   const VoxelShares shares(parts, scheme, shape.is_closed());
   const WallFans& fans = shape.fans();
   const Buffer<VertexOwner>& owners = surface.owners;
@@ -245,11 +251,5 @@ Buffer<float> missing_volume(const Lattice<T>& lattice, Scheme scheme,
   });
   return missing;
 }
-
-#define ISOMESH_INSTANTIATE(T)                                                               \
-  template Buffer<float> missing_volume(const Lattice<T>&, Scheme, const SeparatingSurface&, \
-                                        const WallShape&, const Context&);
-ISOMESH_FOR_EACH_LABEL_TYPE(ISOMESH_INSTANTIATE)
-#undef ISOMESH_INSTANTIATE
 
 }  // namespace isomesh::mesh

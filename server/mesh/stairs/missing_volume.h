@@ -10,20 +10,19 @@
 
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
+#include "server/mesh/labels/label_index.h"
 #include "server/mesh/labels/separate.h"
-#include "server/mesh/lattice/lattice.h"
 #include "server/mesh/stairs/wall_shape.h"
 
 namespace isomesh::mesh {
 
 // Returns, by fan of the shape and in its unit, the volume that the label at the wall's back lacks.
 // Negative: it has too much. `shape` must be of that surface, which extract_walls made of the same
-// lattice and scheme and which has not been moved since. Caps stay flat, so what is missing at the
+// parts and scheme and which has not been moved since. Caps stay flat, so what is missing at the
 // rim of one is owed to the wall that leaves it, and within one it is left out; the bevels of the
-// volume's box count as exact. For the six integer types of SampleType. The result is the same for
-// any number of threads. Throws Error kCancelled.
-template <class T>
-Buffer<float> missing_volume(const Lattice<T>& lattice, Scheme scheme,
+// volume's box count as exact. The result is the same for any number of threads. Throws Error
+// kCancelled.
+Buffer<float> missing_volume(const SampleParts& parts, Scheme scheme,
                              const SeparatingSurface& surface, const WallShape& shape,
                              const Context& context);
 

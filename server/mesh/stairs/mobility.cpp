@@ -82,6 +82,16 @@ class Finder {
              [&](std::size_t i) { body(std::size_t{found_.curves[i]}); });
   }
 
+  // Each time, all curves' values become what `next` makes of those before.
+  template <class Next>
+  void repeat_along_curves(int steps, Buffer<float>& values, const Next& next) const {
+    Buffer<float> after = filled(0.0F);
+    for (int step = 0; step < steps; ++step) {
+      for_curves([&](std::size_t v) { after[v] = next(v); });
+      std::swap(values, after);
+    }
+  }
+
   // Also what is owed for the bend alone, and the diffusivity.
   void find_bends(std::size_t v) {
     Lanes normal = {};
@@ -130,27 +140,20 @@ class Finder {
     Buffer<float> junctions = filled(0.0F);
     for_curves(
         [&](std::size_t v) { junctions[v] = shape_.neighbors().degree(v) > 2 ? 1.0F : 0.0F; });
-    Buffer<float> next = filled(0.0F);
-    for (int step = 0; step < kCalmSteps; ++step) {
-      for_curves(
-          [&](std::size_t v) { next[v] = 0.5F * junctions[v] + 0.5F * shape_.mean(v, junctions); });
-      std::swap(junctions, next);
-    }
+    repeat_along_curves(kCalmSteps, junctions, [&](std::size_t v) {
+      return 0.5F * junctions[v] + 0.5F * shape_.mean(v, junctions);
+    });
     for_curves(
         [&](std::size_t v) { reach_[v][kNoise] = clamped((junctions[v] - kNoisy) / kNoisy); });
   }
 
   void spread_curve_bends() {
-    Buffer<float> next = filled(0.0F);
-    for (std::size_t step = 0; step < kBendSteps; ++step) {
-      for_curves([&](std::size_t v) {
-        float most = 0;
-        shape_.neighbors().visit(
-            v, [&](std::uint32_t neighbor) { most = std::max(most, curve_bends_[neighbor]); });
-        next[v] = std::max(curve_bends_[v], most - kBendLoss);
-      });
-      std::swap(curve_bends_, next);
-    }
+    repeat_along_curves(kBendSteps, curve_bends_, [&](std::size_t v) {
+      float most = 0;
+      shape_.neighbors().visit(
+          v, [&](std::uint32_t neighbor) { most = std::max(most, curve_bends_[neighbor]); });
+      return std::max(curve_bends_[v], most - kBendLoss);
+    });
   }
 
   // All four within walls; a curve is near with all its strength beside it, and less with each edge
@@ -226,7 +229,10 @@ class Finder {
     });
     for (std::size_t v = 0; v < shape_.vertices(); ++v) {
       const auto vertex = static_cast<std::uint32_t>(v);
-      if (found_.moves[v] > 0) found_.moving.push_back(vertex);
+      if (found_.moves[v] > 0) {
+        found_.moving.push_back(vertex);
+        (shape_.is_curve(v) ? found_.moving_curves : found_.walls).push_back(vertex);
+      }
       if (reach_[v][kNear] > 0 && !shape_.is_curve(v)) found_.beside.push_back(vertex);
     }
   }

@@ -17,7 +17,9 @@ struct Mobility {
   std::vector<float> calm;  // 0 where junctions crowd together as noise makes them
 
   std::vector<std::uint32_t> moving;  // vertices of which moves > 0
-  std::vector<std::uint32_t> curves;  // vertices on curves
+  std::vector<std::uint32_t> walls;   // those of them that are on no curve
+  std::vector<std::uint32_t> curves;  // all vertices on curves
+  std::vector<std::uint32_t> moving_curves;
   std::vector<std::uint32_t> beside;  // others within five edges of a curve
 };
 

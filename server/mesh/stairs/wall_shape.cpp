@@ -42,13 +42,13 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   at.resize_for_overwrite(mesh.positions.size());
   // Caps lie half a step beyond the outermost samples, the ends of an open wall in them.
   const double beyond = closed_ ? 0.5 : 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float first = static_cast<float>(-beyond) * spacing_[axis];
-    const float last =
-        static_cast<float>(samples[static_cast<std::size_t>(axis)] - 1 + beyond) * spacing_[axis];
-    low_[axis] = std::min(first, last);
-    high_[axis] = std::max(first, last);
-  }
+  const auto lane = [&](std::size_t axis) {
+    return static_cast<float>(samples[axis] - 1 + beyond);
+  };
+  const Lanes near = static_cast<float>(-beyond) * spacing_;
+  const Lanes far = Lanes{lane(0), lane(1), lane(2), 0} * spacing_;
+  low_ = smaller(near, far);
+  high_ = larger(near, far);
   for_each(context, mesh.positions.size(), [&](std::size_t v) {
     constexpr double kNear = 1e-3;  // as single precision leaves it, far from the origin
     const auto index = index_of(to_space, to_point(mesh.positions[v]));

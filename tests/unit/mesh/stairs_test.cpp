@@ -81,7 +81,8 @@ std::map<std::int64_t, double> owed(const Labels& volume, const SeparateOptions&
   const SurfaceCount count = count_walls(lattice, options, {});
   extract_walls(lattice, options, count, {}, surface);
   const WallShape shape(surface, lattice.dims, lattice.to_space, options.close, {});
-  const Buffer<float> missing = missing_volume(lattice, options.scheme, surface, shape, {});
+  const Buffer<float> missing =
+      missing_volume(PartsOf(lattice, surface.parts), options.scheme, surface, shape, {});
   const WallFans& fans = shape.fans();
   const Lanes spacing = shape.spacing();
   const double voxel = std::abs(double{spacing[0]} * spacing[1] * spacing[2]);
