@@ -23,15 +23,12 @@ export interface Answer {
   text: string;
 }
 
-export interface Patience {
-  signal?: AbortSignal | null;
+export type Init = RequestInit & {
   // How long the server may be busy, if that differs from the connection's own limit.
   retrySeconds?: number;
   // Called before each pause, with its seconds.
   onBusy?: (seconds: number) => void;
-}
-
-export type Init = RequestInit & Patience;
+};
 
 export class Connection {
   // False after a request that got no whole response.

@@ -1,6 +1,6 @@
 // Uploads with their progress.
 import type { HeaderValues } from './busy';
-import type { Answer, Connection } from './connection';
+import type { Connection } from './connection';
 import { jsonOf } from './problem';
 import { answerInParts } from './resume';
 import type { Uploaded, UploadedVolume, UploadOptions, Volume } from './types';
@@ -43,23 +43,18 @@ function bytesOf(whole: unknown): Blob {
   );
 }
 
-// Continues after its connection broke.
+// Continues after its connection broke. The server may have kept the bytes.
 export async function upload(connection: Connection, given: unknown, options: UploadOptions): Promise<Uploaded> {
   const whole = bytesOf(given);
-  options.signal?.throwIfAborted();
-  const { status, headers, text } = await answerTo(connection, whole, options);
+  const { name, signal, onBusy } = options;
+  signal?.throwIfAborted();
+  const path = uploadPath(options);
+  const named: Record<string, string> = name === undefined ? {} : { 'Content-Disposition': dispositionOf(name) };
+  const { status, headers, text } = await (options.kept === undefined
+    ? answerInParts(connection, path, named, whole, options)
+    : connection.ask(path, { method: 'POST', headers: named, signal, onBusy }));
   const kept = headers.get('Isomesh-Upload') ?? undefined;
   const volumes = uploadedOf(status, text, headers);
   options.onProgress?.(whole.size, whole.size);
   return { volumes, kept };
-}
-
-function answerTo(connection: Connection, whole: Blob, options: UploadOptions): Promise<Answer> {
-  const path = uploadPath(options);
-  const named: Record<string, string> =
-    options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
-  if (options.kept === undefined) return answerInParts(connection, path, named, whole, options);
-  // The server has the bytes.
-  const { signal, onBusy } = options;
-  return connection.ask(path, { method: 'POST', headers: named, signal, onBusy });
 }

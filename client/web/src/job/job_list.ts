@@ -33,7 +33,6 @@ export class JobList {
   // False if so many wait that only the newest of them are listed.
   hasWholeQueue = true;
   private pages = 1; // that are shown
-  private queued: readonly Job[] = [];
   // Older than the pages, and followed to their end.
   private ended: readonly Job[] = [];
 
@@ -51,7 +50,6 @@ export class JobList {
     if (pages !== this.pages) return;
     if (next === null) this.hasWholeQueue = true;
     this.ended = [...this.ended, ...ended.flatMap((job) => job ?? [])].slice(-mostEnded);
-    this.queued = active.filter(({ state }) => state === 'queued');
     this.next = next;
     const all = [...this.ended, ...untold.slice(mostAsked), ...active, ...listed];
     this.jobs = newestFirst(new Map(all.map((job) => [job.id, job])).values());
@@ -70,7 +68,8 @@ export class JobList {
 
   // Places in the queue, from 1. Empty where they are not known.
   places(): Map<string, number> {
-    return new Map(this.hasWholeQueue ? inOrder(this.queued).map(({ id }, at) => [id, at + 1]) : []);
+    const queued = this.hasWholeQueue ? this.jobs.filter(({ state }) => state === 'queued') : [];
+    return new Map(inOrder(queued).map(({ id }, at) => [id, at + 1]));
   }
 
   private async load(pages: number): Promise<Page> {
