@@ -143,12 +143,16 @@ void tell_thickness(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (!mesh.thickness) return;
   const Thickness& thickness = *mesh.thickness;
   if (!thickness.thinnest_mm || !thickness.place) {
-    rows.push_back({"thinnest wall", "none: no place has another side behind it"});
+    rows.push_back({"thin walls", "none: no place has another side behind it"});
     return;
   }
-  rows.push_back({"thinnest wall", in.length(*thickness.thinnest_mm, 3) + " at " +
-                                       place_text(*thickness.place, in)});
-  rows.push_back({"  too thin", in.area(thickness.thin_area_mm2) + " of the surface"});
+  // Rough surfaces have a wall of nearly nothing somewhere: how much is thin tells more.
+  // Two labels have the area between them together, and each its own walls.
+  const std::string share =
+      mesh.labels.empty() ? ", " + percent(thickness.thin_area_mm2, mesh.area_mm2) : "";
+  rows.push_back({"thin walls", in.area(thickness.thin_area_mm2) + " of the surface" + share});
+  rows.push_back({"  thinnest", in.length(*thickness.thinnest_mm, 3) + " at " +
+                                    place_text(*thickness.place, in)});
 }
 
 void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {

@@ -116,11 +116,9 @@ let shownPath = '';
 
 // The title of the browser's tab says what it shows.
 function nameTab(view: HTMLElement, place: Place): void {
-  const name = (): string => view.dataset.title ?? place.title;
-  document.title = `${name()} \u00b7 isomesh`;
-  const renamed = new MutationObserver(() => {
-    document.title = `${name()} \u00b7 isomesh`;
-  });
+  const name = (): void => void (document.title = `${view.dataset.title ?? place.title} \u00b7 isomesh`);
+  name();
+  const renamed = new MutationObserver(name);
   renamed.observe(view, { attributes: true, attributeFilter: ['data-title'] });
   scope.onEnd(() => renamed.disconnect());
 }

@@ -75,14 +75,17 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
             "  mesh.drc        3.5 MB (3,510,351 B)\n");
 }
 
-TEST(MeshReport, TellsTheThinnestWall) {
+TEST(MeshReport, TellsHowMuchIsThinAndTheThinnestWall) {
   MeshSummary mesh;
+  mesh.area_mm2 = 1234;
   EXPECT_THAT(mesh_report(mesh), Not(HasSubstr("thinnest")));
   mesh.thickness = Thickness{.thinnest_mm = 0.25, .place = {{1, 2, -3}}, .thin_area_mm2 = 12.34};
-  EXPECT_THAT(mesh_report(mesh), HasSubstr("thinnest wall   0.250 mm at 1.00, 2.00, -3.00 mm\n"
-                                           "    too thin      12.3 mm² of the surface\n"));
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("thin walls      12.3 mm² of the surface, 1.0 %\n"
+                                           "    thinnest      0.250 mm at 1.00, 2.00, -3.00 mm\n"));
+  mesh.labels.resize(2);
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("12.3 mm² of the surface\n"));
   mesh.thickness = Thickness();
-  EXPECT_THAT(mesh_report(mesh), HasSubstr("thinnest wall   none: "));
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("thin walls      none: "));
 }
 
 TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {

@@ -28,10 +28,10 @@ describe('a surface', () => {
     const made = await madeJob(at);
     expect(made.parameters).toMatchObject({ close: true, certify: true, min_thickness_mm: 0.4, fill_cavities: true, smoothing: 'taubin', max_error_mm: 0.2, components: { keep: 1 } });
     const { name, bytes } = await saved(page, /^Certificate$/);
-    expect(name).toMatch(/-certificate\.json$/);
-    const told = JSON.parse(bytes.toString()) as { certificate: { found_mm: number }; files: Record<string, { sha256: string }> };
-    expect(told.certificate.found_mm).toBe(made.mesh?.certificate?.found_mm);
-    expect(told.files['3mf']?.sha256).toBe(made.mesh?.files['3mf']?.sha256);
+    expect(name).toMatch(/\.report\.json$/);
+    const { job } = JSON.parse(bytes.toString()) as { job: typeof made };
+    expect(job.mesh?.certificate?.found_mm).toBe(made.mesh?.certificate?.found_mm);
+    expect(job.mesh?.files['3mf']?.sha256).toBe(made.mesh?.files['3mf']?.sha256);
   });
 
   it('for printing is one closed component, and says in plain words that it is ready', async ({ page, daemon }) => {
@@ -63,7 +63,7 @@ describe('a surface', () => {
     await expect.poll(() => bad.count()).toBe(4);
     const text = await page.locator('.print-check').innerText();
     expect(text).toMatch(/Open at .* edges/);
-    expect(text).toMatch(/Thinnest wall: [\d.]+ mm at .* \(below the nozzle's 0\.9 mm: [\d.]+ mm\u00b2\)/);
+    expect(text).toMatch(/Walls below the nozzle's 0\.9 mm: [\d.]+ mm\u00b2 of the surface \([\d.]+ %\)\. The thinnest is [\d.]+ mm at/);
     await bad.getByRole('button', { name: 'Show it' }).click();
     await expect.poll(() => page.locator('.pane').getAttribute('data-marks')).toBe('1');
     await bad.getByRole('button', { name: 'Show them' }).click();

@@ -247,7 +247,10 @@ describe('slices before there is a mesh', () => {
     await page.goto('about:blank');
     await page.goto(`${daemon.url}/#/volumes/${ball}?iso=100&at=16,24,24`);
     await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
-    await page.getByLabel('Overlay', { exact: true }).selectOption(overlay);
+    const choice = page.getByLabel('Overlay', { exact: true });
+    // A volume may be called "None".
+    await expect.poll(() => choice.locator('option').first().innerText()).toBe('No overlay');
+    await choice.selectOption(overlay);
     await page.getByLabel('Opacity of the overlay').fill('1');
     const blue = (): Promise<number> =>
       page.evaluate(() => {

@@ -252,42 +252,6 @@ describe('the pause itself', () => {
   });
 });
 
-describe('an upload of a page', () => {
-  // Sends what the test says, in turn.
-  class Request {
-    static readonly responses: [status: number, text: string][] = [];
-    static sent = 0;
-    readonly upload = {} as XMLHttpRequestUpload;
-    status = 0;
-    responseText = '';
-    onload = (): void => undefined;
-    open(): void {}
-    setRequestHeader(): void {}
-    getResponseHeader(name: string): string | null {
-      return name === 'Retry-After' && this.status === 429 ? '7' : null;
-    }
-    send(): void {
-      Request.sent += 1;
-      [this.status, this.responseText] = Request.responses.shift() ?? [0, ''];
-      this.onload();
-    }
-  }
-
-  it('waits in the same way', async () => {
-    vi.stubGlobal('XMLHttpRequest', Request);
-    const busy = JSON.stringify({ title: 'Busy', detail: 'come again', status: 429 });
-    Request.responses.push([429, busy], [429, busy], [201, '{"id":"abc"}']);
-    const told: number[] = [];
-    const { volumes } = await client.upload(new Uint8Array(9), { onBusy: (seconds) => told.push(seconds) });
-    expect(volumes[0]?.volume).toEqual({ id: 'abc' });
-    expect(told.map((pause, at) => pause - (clock.pauses[at] ?? NaN))).toEqual([expect.closeTo(0), expect.closeTo(0)]);
-    expect(told).toHaveLength(2);
-    Request.responses.push([429, busy]);
-    const hasty = new Client({ server: daemon.address, retrySeconds: 0 });
-    expect(await rejectionOf(hasty.upload(new Uint8Array(9)))).toMatchObject({ status: 429, retryAfter: 7 });
-  });
-});
-
 describe('a page that refreshes a list', () => {
   it('begins no other refresh while one waits', async () => {
     vi.useRealTimers();

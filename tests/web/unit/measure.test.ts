@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { angleAt, areaOf, measureText } from '@/volume/measure';
 import { pixelsOf, placeText, windowName } from '@/views/slices/slice_looks';
-import { rounded } from '@/views/slices/slice_readout';
+import { seenText } from '@/views/slices/slice_readout';
 import { plainValue, profileOf, statisticsIn } from '@/volume/exact';
 import { SliceMeasures } from '@/views/slices/slice_measure';
 import { slicePlane } from '@/volume/geometry';
@@ -67,11 +67,12 @@ describe('the looks of slices', () => {
     expect(windowName([0, 81], usual)).toBe('');
   });
 
-  it('tell values with the digits that their window needs', () => {
-    const window: [number, number] = [1_000_000, 1_000_009];
-    expect(rounded({ low: 1_000_004.47, high: 1_000_004.5 }, window)).toBe('about 1\u202f000\u202f004.49');
-    expect(rounded({ low: -Infinity, high: 1_000_000.02 }, window)).toBe('at most 1\u202f000\u202f000.02');
-    expect(rounded({ low: 34.2, high: 50.1 }, [-1000, 3000])).toBe('about 40');
+  it('tell values as exactly as eight bits do', () => {
+    const seen = (value: number, window: [number, number]): string => seenText({ axis: 'z', index: 0, width: 1, height: 1, values: Uint8Array.of(value), window }, 0, 0);
+    expect(seen(127, [1_000_000, 1_000_009])).toBe('about 1\u202f000\u202f004.48');
+    expect(seen(0, [1_000_000, 1_000_009])).toBe('at most 1\u202f000\u202f000.02');
+    expect(seen(66, [-1000, 3000])).toBe('about 40');
+    expect([0, 51, 255].map((value) => seen(value, [-100, 155]))).toEqual(['at most \u221299.5', 'about \u221249', 'at least 154.5']);
   });
 
   it('tell places in either space', () => {

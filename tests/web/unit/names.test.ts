@@ -2,7 +2,6 @@ import { describe, expect, it } from 'vitest';
 import type { Volume } from '@/api/types';
 import { defaultParameters, surfaceInNames } from '@/job/parameters';
 import { fileStem } from '@/volume/names';
-import { valueIn, type Slice } from '@/volume/slices';
 
 describe('a file that is made of a volume', () => {
   const named = (name: string | null, series = ''): string =>
@@ -22,15 +21,5 @@ describe('a file that is made of a volume', () => {
     const nameAt = (iso: number): string => surfaceInNames(defaultParameters('v', iso));
     expect([-300, 1250, -1250.4, 0.25].map(nameAt)).toEqual(['iso--300', 'iso-1250', 'iso--1250', 'iso-0.25']);
     expect(surfaceInNames({ labels: 'all' })).toBe('all-labels');
-  });
-});
-
-describe('a value in a slice', () => {
-  const slice = { width: 2, height: 2, values: Uint8Array.from([0, 51, 255, 100]), window: [-100, 155] } as unknown as Slice;
-
-  it('is as exact as eight bits are', () => {
-    expect(valueIn(slice, 1, 0)).toEqual({ low: -49.5, high: -48.5 });
-    expect(valueIn(slice, 0, 0)).toEqual({ low: -Infinity, high: -99.5 });
-    expect(valueIn(slice, 0, 1)).toEqual({ low: 154.5, high: Infinity });
   });
 });

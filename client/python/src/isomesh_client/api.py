@@ -744,7 +744,9 @@ class Thickness(TypedDict):
     triangles, and of the parts into which large ones are divided, in the mesh before files
     round its coordinates. Of labels, in each label's own surface."""
 
-    #: The least thickness. null if no point has an opposite side, for example in an open sheet.
+    #: The least thickness. null if no point has an opposite side, for example in an open sheet. A
+    #: rough surface has walls of nearly nothing somewhere, and so have specks beside it:
+    #: thin_area_mm2 tells more about a print.
     thinnest_mm: Optional[float]
     #: A point of the surface with that thickness, in LPS millimetres.
     place: Optional[Vector]

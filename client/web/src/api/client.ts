@@ -88,8 +88,8 @@ export class Client {
   // --- Volumes ---
 
   /**
-   * Uploads a file, an archive of files, or raw samples. An upload of 8 MiB or more continues after its connection
-   * broke. Rejects with a TypeError if `whole` is something else than bytes, such as a file's name.
+   * Uploads a file, an archive of files, or raw samples. An upload continues after its connection broke.
+   * Rejects with a TypeError if `whole` is something else than bytes, such as a file's name.
    */
   upload(whole: GlobalBlob | ArrayBuffer | ArrayBufferView, options: UploadOptions = {}): Promise<Uploaded> {
     return upload(this.connection, whole, options);

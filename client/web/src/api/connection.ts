@@ -23,15 +23,12 @@ export interface Answer {
   text: string;
 }
 
-export interface Patience {
-  signal?: AbortSignal | null;
+export type Init = RequestInit & {
   // How long the server may be busy, if that differs from the connection's own limit.
   retrySeconds?: number;
   // Called before each pause, with its seconds.
   onBusy?: (seconds: number) => void;
-}
-
-export type Init = RequestInit & Patience;
+};
 
 export class Connection {
   // False after a request that got no whole response.
@@ -99,24 +96,6 @@ export class Connection {
     return this.received((await this.send(path, init)).arrayBuffer(), init);
   }
 
-  // All requests go through this. Calls `attempt` until the server is no longer busy, or the time is over: every request
-  // of the API can be repeated, and so can its body.
-  async patiently<T extends Pick<Answer, 'status' | 'headers'>>(
-    attempt: () => Promise<T>,
-    { signal, retrySeconds = this.retrySeconds, onBusy }: Patience,
-    discard: (refused: T) => void = () => undefined,
-  ): Promise<T> {
-    const pauses = new BusyPauses(retrySeconds);
-    for (;;) {
-      const answer = await attempt();
-      const seconds = isBusy(answer.status) ? pauses.next(answer.headers) : null;
-      if (seconds === null) return answer;
-      discard(answer);
-      onBusy?.(seconds);
-      await this.wait(1000 * seconds, signal);
-    }
-  }
-
   private async wait(milliseconds: number, signal: AbortSignal | null | undefined): Promise<void> {
     this.waiting += 1;
     this.busy.value = true;
@@ -126,17 +105,22 @@ export class Connection {
     signal?.throwIfAborted();
   }
 
-  private begin(path: string, { retrySeconds, onBusy, ...init }: Init): Promise<Response> {
-    const attempt = async (): Promise<Response> => {
+  // All requests go through this. It waits until the server is no longer busy, or the time is over: every request of the
+  // API can be repeated, and so can its body.
+  private async begin(path: string, { retrySeconds = this.retrySeconds, onBusy, ...init }: Init): Promise<Response> {
+    const pauses = new BusyPauses(retrySeconds);
+    for (;;) {
       const headers = this.headers(init.headers as Record<string, string>);
       const response = await this.received(fetch(this.addressOf(path), { ...init, headers }), init);
       this.connected.value = true;
       if (response.status === 401) this.unauthorized.value = true;
-      return response;
-    };
-    // Or Node keeps the connection for a body that nobody reads.
-    const discard = ({ body }: Response): void => void body?.cancel().catch(() => undefined);
-    return this.patiently(attempt, { signal: init.signal, retrySeconds, onBusy }, discard);
+      const seconds = isBusy(response.status) ? pauses.next(response.headers) : null;
+      if (seconds === null) return response;
+      // Or Node keeps the connection for a body that nobody reads.
+      void response.body?.cancel().catch(() => undefined);
+      onBusy?.(seconds);
+      await this.wait(1000 * seconds, init.signal);
+    }
   }
 
   // A connection may break before a response and in its body.

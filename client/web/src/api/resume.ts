@@ -28,7 +28,7 @@ const firstPause = 100;
 const longestPause = 3000;
 
 // Throws an ApiError if the bytes cannot be read. The failure of a request tells this only in Node.
-export async function assertReadable(bytes: Blob): Promise<void> {
+async function assertReadable(bytes: Blob): Promise<void> {
   try {
     await bytes.arrayBuffer();
   } catch (cause) {

@@ -7,7 +7,7 @@ import { priorities } from './table';
 export const mostOfState = 1000;
 // Jobs that no list has told of since, at each refresh.
 const mostAsked = 20;
-// Finished jobs older than the pages that were loaded.
+// Finished jobs older than the pages.
 const mostEnded = 100;
 
 export interface JobSource {
@@ -26,78 +26,61 @@ function newestFirst(jobs: Iterable<Job>): Job[] {
 }
 
 export class JobList {
-  // All that run and wait, whatever their age, and those of the loaded pages; the newest first.
+  // All that run and wait, whatever their age, and those of the pages that are shown; the newest first.
   jobs: readonly Job[] = [];
-  // The cursor of the page after those that were loaded; null if there is none.
+  // The cursor of the page after those that are shown; null if there is none.
   next: string | null = null;
   // False if so many wait that only the newest of them are listed.
   hasWholeQueue = true;
-  // Without gaps.
-  private loaded: readonly Job[] = [];
+  private pages = 1; // that are shown
+  // Older than the pages, and followed to their end.
   private ended: readonly Job[] = [];
-  private queued: readonly Job[] = [];
-  private hasOlder = false;
-  // Grows so that each of many lost jobs is asked for.
-  private turn = 0;
-  private last: Promise<void> = Promise.resolve();
-  private pending = 0;
 
   constructor(private readonly source: JobSource) {}
 
-  // True while the server is asked.
-  get isBusy(): boolean {
-    return this.pending > 0;
+  // Makes one request for each page, if that is not the last one two more, and at most mostAsked others.
+  async refresh(): Promise<void> {
+    const { pages } = this;
+    const { jobs: listed, next } = await this.load(pages);
+    const active = next === null ? listed.filter(({ state }) => !isFinal(state)) : await this.listActive();
+    const told = new Set([...listed, ...active].map(({ id }) => id));
+    const untold = this.jobs.filter(({ id, state }) => !isFinal(state) && !told.has(id));
+    const ended = await Promise.all(untold.slice(0, mostAsked).map(({ id }) => this.find(id)));
+    // An older page was asked for meanwhile.
+    if (pages !== this.pages) return;
+    if (next === null) this.hasWholeQueue = true;
+    this.ended = [...this.ended, ...ended.flatMap((job) => job ?? [])].slice(-mostEnded);
+    this.next = next;
+    const all = [...this.ended, ...untold.slice(mostAsked), ...active, ...listed];
+    this.jobs = newestFirst(new Map(all.map((job) => [job.id, job])).values());
   }
 
-  // Makes at most 3 + mostAsked requests, and one if there is only one page.
-  refresh(): Promise<void> {
-    return this.afterOthers(() => this.lookAgain());
-  }
-
-  loadOlder(): Promise<void> {
-    return this.afterOthers(() => this.loadPage());
+  async loadOlder(): Promise<void> {
+    this.pages += 1;
+    await this.refresh();
   }
 
   // It was erased.
   forget(id: string): void {
     const others = (jobs: readonly Job[]): Job[] => jobs.filter((job) => job.id !== id);
-    [this.jobs, this.loaded, this.ended] = [others(this.jobs), others(this.loaded), others(this.ended)];
+    [this.jobs, this.ended] = [others(this.jobs), others(this.ended)];
   }
 
   // Places in the queue, from 1. Empty where they are not known.
   places(): Map<string, number> {
-    return new Map(this.hasWholeQueue ? inOrder(this.queued).map(({ id }, at) => [id, at + 1]) : []);
+    const queued = this.hasWholeQueue ? this.jobs.filter(({ state }) => state === 'queued') : [];
+    return new Map(inOrder(queued).map(({ id }, at) => [id, at + 1]));
   }
 
-  // Each of them builds on the pages that the others have loaded.
-  private async afterOthers(work: () => Promise<void>): Promise<void> {
-    this.pending += 1;
-    const result = this.last.then(work);
-    this.last = result.catch(() => undefined);
-    try {
-      await result;
-    } finally {
-      this.pending -= 1;
+  private async load(pages: number): Promise<Page> {
+    const jobs: Job[] = [];
+    let next: string | null = '';
+    for (let page = 0; page < pages && next !== null; page += 1) {
+      const part: Page = await this.source.listJobs(next);
+      jobs.push(...part.jobs);
+      next = part.next;
     }
-  }
-
-  private async lookAgain(): Promise<void> {
-    const page = await this.source.listJobs();
-    const active = page.next === null ? page.jobs.filter(({ state }) => !isFinal(state)) : await this.listActive();
-    if (page.next === null) this.hasWholeQueue = true;
-    this.takeNewest(page);
-    await this.bringUpToDate(new Map([...page.jobs, ...active].map((job) => [job.id, job])));
-    this.queued = active.filter(({ state }) => state === 'queued');
-    this.settle(active);
-  }
-
-  private async loadPage(): Promise<void> {
-    if (this.next === null) return;
-    const page = await this.source.listJobs(this.next);
-    this.hasOlder = true;
-    this.loaded = [...this.loaded, ...page.jobs];
-    this.next = page.next;
-    this.settle(this.jobs.filter(({ state }) => !isFinal(state)));
+    return { jobs, next };
   }
 
   // One after the other, so that a job that starts meanwhile is in the second list at least.
@@ -108,39 +91,6 @@ export class JobList {
     return [...new Map([...queued.jobs, ...running.jobs].map((job) => [job.id, job])).values()];
   }
 
-  private takeNewest({ jobs, next }: Page): void {
-    const known = new Set(this.loaded.map(({ id }) => id));
-    // Those between the newest page and the loaded ones are unknown after a pause: older ones have to be loaded again.
-    if (!this.hasOlder || !jobs.some(({ id }) => known.has(id))) {
-      this.hasOlder = false;
-      this.loaded = jobs;
-      this.next = next;
-      return;
-    }
-    const newest = new Set(jobs.map(({ id }) => id));
-    this.loaded = [...jobs, ...this.loaded.filter(({ id }) => !newest.has(id))];
-  }
-
-  // Takes over what the lists told, and asks for the others that were not final.
-  private async bringUpToDate(told: ReadonlyMap<string, Job>): Promise<void> {
-    const open = newestFirst(new Map([...this.jobs, ...this.loaded].map((job) => [job.id, job])).values());
-    const lost = this.someOf(open.filter(({ id, state }) => !isFinal(state) && !told.has(id)));
-    const now = new Map<string, Job | null>(told);
-    await Promise.all(lost.map(async ({ id }) => now.set(id, await this.find(id))));
-    const loaded = new Set(this.loaded.map(({ id }) => id));
-    this.loaded = this.loaded.flatMap((job) => now.get(job.id) ?? (now.has(job.id) ? [] : [job]));
-    const ended = lost.flatMap(({ id }) => (loaded.has(id) ? [] : (now.get(id) ?? [])));
-    this.ended = [...this.ended, ...ended.filter(({ state }) => isFinal(state))].slice(-mostEnded);
-  }
-
-  // Others at each call if there are more than can be asked for at once.
-  private someOf(jobs: readonly Job[]): readonly Job[] {
-    if (jobs.length <= mostAsked) return jobs;
-    const first = this.turn % jobs.length;
-    this.turn += mostAsked;
-    return [...jobs.slice(first), ...jobs.slice(0, first)].slice(0, mostAsked);
-  }
-
   // Null if it was erased.
   private async find(id: string): Promise<Job | null> {
     try {
@@ -149,9 +99,5 @@ export class JobList {
       if (isGone(error)) return null;
       throw error;
     }
-  }
-
-  private settle(active: readonly Job[]): void {
-    this.jobs = newestFirst(new Map([...this.ended, ...active, ...this.loaded].map((job) => [job.id, job])).values());
   }
 }

@@ -60,12 +60,3 @@ export function isForPrinter({ formats, certify }: JobParameters): boolean {
 export function isForPrinting({ parameters, mesh }: Job): boolean {
   return isForPrinter(parameters) && (mesh?.quality.closed ?? false);
 }
-
-// The measurements, the files and the parameters, to keep with a print.
-export function certificateFile(job: Job): string {
-  const { parameters, mesh, finished, id } = job;
-  const { certificate, thickness, quality, volume_mm3: volume, area_mm2: area, triangles: count, files } = mesh ?? {};
-  const sums = Object.fromEntries(Object.entries(files ?? {}).map(([format, { bytes, sha256 }]) => [format, { bytes, sha256 }]));
-  const told = { job: id, finished, parameters, triangles: count, volume_mm3: volume, area_mm2: area, certificate, thickness, quality, files: sums };
-  return `${JSON.stringify(told, null, 2)}\n`;
-}

@@ -112,23 +112,6 @@ export function greyTable(slice: Pick<Slice, 'window'>, shown: Window): Uint8Cla
   return table;
 }
 
-// A sample's value as far as the slice tells it: between two values that are the same when it is exact.
-export interface ValueRange {
-  low: number;
-  high: number;
-}
-
-export function valueIn({ window: [low, high], values, width }: Slice, column: number, row: number): ValueRange {
-  const value = values[row * width + column] ?? 0;
-  const step = (high - low) / 255;
-  const middle = low + value * step;
-  // At both ends of the window it may be anything beyond.
-  return {
-    low: value === 0 ? -Infinity : middle - step / 2,
-    high: value === 255 ? Infinity : middle + step / 2,
-  };
-}
-
 // An iso-value in the units of a slice's values.
 export function inSlice(slice: Pick<Slice, 'window'>, iso: number): number {
   const [low, high] = slice.window;

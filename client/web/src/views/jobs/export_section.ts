@@ -1,10 +1,12 @@
 // Exports beside the files of a job: for a 3D printer, for a phone, and the certificate of the measurements.
+import { client } from '../../client';
 import type { Job, Volume } from '../../api/types';
-import { certificateFile, isForPrinting } from '../../job/printing';
+import { isForPrinting } from '../../job/printing';
 import { isByLabels } from '../../job/table';
-import { fileNameOf, makePrintable, saveVariant } from '../../job/variants';
+import { makePrintable, saveVariant } from '../../job/variants';
 import { button, h } from '../../ui/dom';
-import { saveBlob } from '../../ui/save';
+import { tellError } from '../../ui/notices';
+import { saveReport } from './report';
 
 // The number of triangles that a phone can show.
 const triangles = 150_000;
@@ -27,9 +29,9 @@ export function exportActions(job: Job, volume: Volume | null): HTMLElement | nu
         title: 'Saves a file that phones show in augmented reality (AR), with fewer triangles if there are many',
       }),
     mesh.certificate &&
-      button('Certificate', () => saveBlob(new Blob([certificateFile(job)], { type: 'application/json' }), fileNameOf(job, volume, '-certificate.json')), {
+      button('Certificate', () => void client.reportOf(job.id).then(saveReport, tellError), {
         class: 'chip',
-        title: 'Saves the measurements and the SHA-256 of each file',
+        title: 'Saves the measurements, how the error was proven, and the SHA-256 of each file',
       }),
   ]);
 }

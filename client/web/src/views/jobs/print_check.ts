@@ -63,8 +63,12 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
   } else {
     const { place, thinnest_mm: thinnest, thin_area_mm2: area } = thickness;
     const isThin = thinnest !== null && thinnest < width;
-    const than = isThin ? ` (below the nozzle's ${formatNumber(width, 3)} mm: ${formatSize(area)} mm\u00b2). ` : `, no less than the nozzle's ${formatNumber(width, 3)} mm. `;
-    points.push(point(isThin ? 'bad' : 'good', `Thinnest wall: ${thinnestText(mesh)}`, than, place && button('Show it', () => show([place]), { class: 'link', title: 'Marks it on the surface' })));
+    const nozzles = `the nozzle's ${formatNumber(width, 3)} mm`;
+    // Two labels have the area between them together, and each its own walls.
+    const share = isByLabels(parameters) ? '' : ` (${formatNumber((100 * area) / mesh.area_mm2)} %)`;
+    // Rough surfaces have a wall of nearly nothing somewhere: how much is thin tells more.
+    const text = isThin ? `Walls below ${nozzles}: ${formatSize(area)} mm\u00b2 of the surface${share}. The thinnest is ${thinnestText(mesh)}. ` : `Thinnest wall: ${thinnestText(mesh)}, no less than ${nozzles}. `;
+    points.push(point(isThin ? 'bad' : 'good', text, place && button('Show it', () => show([place]), { class: 'link', title: 'Marks it on the surface' })));
   }
   const [low, high] = mesh.bounds;
   const size = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');

@@ -51,9 +51,7 @@ export async function queueView(scope: Scope, { query }: Route): Promise<HTMLEle
   const queue = new Queue(query);
   await queue.refresh();
   queue.restore((query.get('chosen') ?? '').split(','));
-  scope.repeat(refreshEvery, async () => {
-    if (!queue.isBusy) await queue.refresh();
-  });
+  scope.repeat(refreshEvery, () => queue.refresh());
   return queue.element;
 }
 
@@ -106,10 +104,6 @@ class Queue {
       this.body,
       h('div.actions', this.more),
     ]);
-  }
-
-  get isBusy(): boolean {
-    return this.list.isBusy;
   }
 
   async refresh(): Promise<void> {

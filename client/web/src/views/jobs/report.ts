@@ -1,6 +1,6 @@
 // One sheet about a surface, to print or to keep. #/jobs/ID/report
 import { client } from '../../client';
-import type { Job } from '../../api/types';
+import type { Job, JobReport } from '../../api/types';
 import { inWords, jobRequest } from '../../job/parameters';
 import { asText, type Value } from '../../job/table';
 import { fileNameOf } from '../../job/variants';
@@ -26,6 +26,12 @@ export function openReport({ id }: Job, pictures: () => Promise<Blob[]>): void {
   }, tellError);
 }
 
+// As the server tells it.
+export function saveReport(report: JobReport): void {
+  const { job, volume } = report;
+  saveBlob(new Blob([JSON.stringify(report, null, 2)], { type: 'application/json' }), fileNameOf(job, volume, '.report.json'));
+}
+
 export async function reportView(scope: Scope, { path: [, id = ''] }: Route): Promise<HTMLElement> {
   const report = await client.reportOf(id, scope.signal);
   const { job, volume, version, mesher } = report;
@@ -42,7 +48,6 @@ export async function reportView(scope: Scope, { path: [, id = ''] }: Route): Pr
     ['Made', formatTime(job.finished ?? job.created)],
     ['Service, mesher', `${version}, ${mesher}`],
   ];
-  const save = (): void => saveBlob(new Blob([JSON.stringify(report, null, 2)], { type: 'application/json' }), fileNameOf(job, volume, '.report.json'));
   const files = Object.entries(mesh?.files ?? {}).map(([format, { bytes, sha256 }]) =>
     row({}, cell(meshFormatTitle(format)), cell(formatBytes(bytes)), cell(h('code', sha256))),
   );
@@ -50,7 +55,7 @@ export async function reportView(scope: Scope, { path: [, id = ''] }: Route): Pr
   return h('article.report', { 'data-title': `Report, ${titleOf(job)}` }, [
     h('div.actions', [
       button('Print', () => window.print(), { class: 'primary' }),
-      button('Save as JSON', save),
+      button('Save as JSON', () => saveReport(report)),
       h('a.button', { href: hashOf(['jobs', id]) }, 'The surface'),
     ]),
     h('h1', titleOf(job)),

@@ -6,7 +6,7 @@ import { formatValue, shortened } from '../../ui/format';
 import { axisIndex, pictureAxes, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
 import { exactText, type ExactSamples } from '../../volume/exact';
-import { valueIn, type Slice, type ValueRange, type Window } from '../../volume/slices';
+import type { Slice } from '../../volume/slices';
 import { placeText, sliceSpace } from './slice_looks';
 
 export interface ReadoutHost {
@@ -22,14 +22,16 @@ export interface ReadoutHost {
   overlaid: (place: Vec3) => string;
 }
 
-// Keeps the digits that the eight bits of a picture over that window tell.
-export function rounded({ low, high }: ValueRange, [from, to]: Window): string {
-  if (low === -Infinity) return `at most ${formatValue(high, to - from)}`;
-  if (high === Infinity) return `at least ${formatValue(low, to - from)}`;
-  const span = high - low;
-  const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, span)));
-  const middle = Math.round((low + high) / 2 / digits) * digits;
-  return `about ${formatValue(shortened(middle, span), span)}`;
+// A sample's value with the digits that the slice's eight bits tell.
+export function seenText({ window: [low, high], values, width }: Slice, column: number, row: number): string {
+  const value = values[row * width + column] ?? 0;
+  const step = (high - low) / 255;
+  const middle = low + value * step;
+  // At both ends of the window it may be anything beyond.
+  if (value === 0) return `at most ${formatValue(middle + step / 2, high - low)}`;
+  if (value === 255) return `at least ${formatValue(middle - step / 2, high - low)}`;
+  const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, step)));
+  return `about ${formatValue(shortened(Math.round(middle / digits) * digits, step), step)}`;
 }
 
 export class SliceReadout {
@@ -67,7 +69,6 @@ export class SliceReadout {
     const slab = this.host.slabOf(slice);
     const exact = slab ? null : this.host.exact.valueAt(slice.axis, place);
     if (exact !== null) return exactText(exact);
-    const seen = slab ?? slice;
-    return rounded(valueIn(seen, place[column], place[row]), seen.window);
+    return seenText(slab ?? slice, place[column], place[row]);
   }
 }

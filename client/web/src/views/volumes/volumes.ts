@@ -16,9 +16,7 @@ import { VolumeSearch } from './volume_search';
 
 const shownJobs = 8;
 const thumbnailPixels = 112;
-const refreshEvery = 5000;
-// Several changes of jobs are one reason to look.
-const refreshDelay = 700;
+const refreshEvery = 2000;
 
 // The middle axial slice, turned as radiologists look.
 async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal: AbortSignal): Promise<void> {
@@ -140,7 +138,8 @@ function surfaceRow(job: Job, volume: string): HTMLElement {
 export async function volumesView(scope: Scope): Promise<HTMLElement> {
   const home = new Home(scope);
   await home.refresh();
-  home.keepFresh();
+  // Shows what other users do.
+  scope.repeat(refreshEvery, () => home.refresh());
   return home.element;
 }
 
@@ -158,7 +157,6 @@ class Home {
   private older: Volume[] = [];
   // The cursor of the page after the older volumes.
   private next: string | null = null;
-  private soon = 0;
   private isSearching = false;
 
   // For a first-time user.
@@ -194,25 +192,6 @@ class Home {
     ]);
     uploads.onStored = () => void this.refresh().catch(tellError);
     scope.onEnd(() => (uploads.onStored = null));
-  }
-
-  // Shows what other users do: jobs at once, volumes some seconds later.
-  keepFresh(): void {
-    const refresh = (): void => {
-      // A lost connection is said at the top of the page.
-      if (!document.hidden && !this.scope.isOver) this.refresh().catch(() => undefined);
-    };
-    this.scope.repeat(refreshEvery, () => this.refresh());
-    this.scope.onEnd(() => clearTimeout(this.soon));
-    const refreshSoon = (): void => {
-      if (this.soon !== 0) return;
-      this.soon = window.setTimeout(() => {
-        this.soon = 0;
-        refresh();
-      }, refreshDelay);
-    };
-    client.events.listen({ onBegin: refreshSoon, onChange: refreshSoon, onPause: () => undefined }, this.scope.signal);
-    this.scope.listen(document, 'visibilitychange', refresh);
   }
 
   async refresh(): Promise<void> {
