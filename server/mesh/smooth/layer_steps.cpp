@@ -456,7 +456,14 @@ void SmoothedLayers::add_triangles(std::ptrdiff_t layer, LayerExtent SmoothedLay
   const LayerView high = layer + 1 < count() ? view(layer + 1) : LayerView();
   const std::uint64_t first = low.first();
   const std::uint64_t split = low.end();
-  (result(layer).*extent).add_triangles(low.triangles(), low.mesh->origin, [&](std::uint32_t v) {
+  const auto add = [&](auto corner) {
+    (result(layer).*extent).add_triangles(low.triangles(), low.mesh->origin, corner);
+  };
+  // Mostly, both lie in one array: to find the place of each corner takes long.
+  if (high.positions == low.positions + low.vertices()) {
+    return add([&](std::uint32_t v) { return load(low.positions[v - first]); });
+  }
+  add([&](std::uint32_t v) {
     return load(v < split ? low.positions[v - first] : high.positions[v - split]);
   });
 }

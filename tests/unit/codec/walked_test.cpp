@@ -112,6 +112,25 @@ std::string walked(Case& one, MeshFormat format) {
   return bytes;
 }
 
+// Tells how many layers have been asked for.
+class Watched : public mesh::LayerSource {
+ public:
+  explicit Watched(mesh::LayerSource& layers) : layers_(layers) {}
+
+  const mesh::SurfaceCount& count() const override { return layers_.count(); }
+  void write(std::uint32_t begin, std::uint32_t end, mesh::Mesh& mesh) override {
+    written_ = std::max(written_, end);
+    layers_.write(begin, end, mesh);
+  }
+  void forget(std::uint32_t begin, std::uint32_t end) override { layers_.forget(begin, end); }
+
+  std::uint32_t written() const { return written_; }
+
+ private:
+  mesh::LayerSource& layers_;
+  std::uint32_t written_ = 0;
+};
+
 // The triangles by the places of their corners, of which some may be equal.
 using Corners = std::array<mesh::Vec3, 3>;
 std::vector<Corners> triangles_in(const std::string& glb) {
@@ -226,6 +245,29 @@ TEST(WalkedGlb, TakesTheBoxOfTheSurfaceIfThatIsNotTheExpectedOne) {
   mesh::Mesh mesh = whole(one);
   mesh.reach = {};
   EXPECT_TRUE(triangles == triangles_in(encoded_whole(one, mesh)));
+}
+
+// The head when the surface has been counted, and triangles with the first windows.
+TEST(WalkedStl, BeginsLongBeforeTheLastLayer) {
+  const Bytes volume = test::noise<std::uint8_t>({0, 1, 60, 61, 200}, {8, 8, 80}, 31);
+  const test::ThreadCount one(1);
+  const auto lattice = volume.lattice();
+  mesh::SurfaceWindows windows(lattice, {.iso = 60, .regularize = true}, {});
+  Watched watched(windows);
+  std::vector<std::uint32_t> layers;  // asked for before each piece
+  const Sink sink = [&](std::span<const std::byte> /*piece*/) {
+    layers.push_back(watched.written());
+  };
+  const Provenance provenance;
+  const auto file = walked_file(
+      {provenance, MeshFormat::kStl, size_of(watched.count()), windows.reach(), sink, nullptr, {}});
+  ASSERT_EQ(layers.size(), 1U) << "the head was not sent";
+  EXPECT_EQ(layers.front(), 0U);
+  OneFile user(*file);
+  walk(watched, {{.steps = means(5, {1})}, 4, false}, {}, user);
+  ASSERT_GT(layers.size(), 10U);
+  EXPECT_LT(layers[1], watched.layers() / 2);
+  EXPECT_EQ(layers.back(), watched.layers());
 }
 
 // Only numbers of one window have to fit 32 bits.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <limits>
 #include <memory>
 #include <set>
@@ -398,6 +399,52 @@ TEST(Walk, EndsWithWhatItsUserThrows) {
       EXPECT_THROW(walk(windows, {one.smooth, 2, true}, {}, thrower), std::runtime_error);
     }
   }
+}
+
+// Its first part ends when a later window has been begun, as if bytes went to a slow client.
+class SlowUser : public Collector {
+ public:
+  explicit SlowUser(const SurfaceCount& count) : Collector(count) {}
+
+  std::size_t begin(const Window& window) override {
+    const Lock lock(mutex_);
+    ++begun_;
+    changed_.notify_all();
+    return Collector::begin(window);
+  }
+
+  InOrder work(const Window& window, std::size_t part) override {
+    InOrder end = Collector::work(window, part);
+    if (window.first_layer > 0 || part > 0) return end;
+    return [this, end = std::move(end)] {
+      {
+        constexpr std::chrono::seconds kLongest(10);
+        Lock lock(mutex_);
+        has_gone_on_ = changed_.wait_for(lock, kLongest,
+                                         [this]() ISOMESH_REQUIRES(mutex_) { return begun_ > 1; });
+      }
+      end();
+    };
+  }
+
+  bool has_gone_on() const { return has_gone_on_; }
+
+ private:
+  Mutex mutex_;
+  Condition changed_;
+  std::size_t begun_ ISOMESH_GUARDED_BY(mutex_) = 0;  // windows
+  bool has_gone_on_ = false;
+};
+
+TEST(Walk, GoesOnSmoothingWhileItsUserIsSlow) {
+  const Bytes volume = specks();
+  const Case one = {volume, {.iso = 60, .regularize = true}, {.steps = means(5, {1})}};
+  const test::ThreadCount two(2);
+  SurfaceWindows windows = windows_of(one);
+  SlowUser slow(windows.count());
+  const WalkEnd end = walk(windows, {one.smooth, 2, true}, {}, slow);
+  EXPECT_TRUE(slow.has_gone_on());
+  expect_same(slow.made(end.effect), made_whole(one));
 }
 
 TEST(Walk, StopsWithinAWindow) {
