@@ -91,7 +91,7 @@ class Encrypted(Receiver):
 
     def assert_rejected(self, daemon, sentence, *options, calling="CT1"):
         self.assertFalse(self.echo(daemon, *options, calling=calling))
-        peers.until(lambda: sentence in daemon.logged(), 10)
+        peers.until(lambda: sentence in daemon.logged())
 
     def test_who_may_not_send(self):
         daemon = self.tls_daemon()
@@ -128,6 +128,9 @@ class Encrypted(Receiver):
     def test_slow_handshakes_hold_nothing_up(self):
         """Silent ones, and some that stop in the middle, for more places than there are."""
         daemon = self.tls_daemon()
+        begun = time.monotonic()
+        self.assertTrue(self.echo(daemon, *self.options()))
+        usual = time.monotonic() - begun
         slow = [socket.create_connection(("127.0.0.1", daemon.dimse_port)) for _ in range(40)]
         hello = ssl.create_default_context().wrap_bio(ssl.MemoryBIO(), out := ssl.MemoryBIO(),
                                                       server_hostname="x")
@@ -142,7 +145,7 @@ class Encrypted(Receiver):
             each.sendall(first)
         begun = time.monotonic()
         self.assertTrue(self.echo(daemon, *self.options()))
-        self.assertLess(time.monotonic() - begun, 4)
+        self.assertLess(time.monotonic() - begun, 4 + usual)
         for each in slow:
             each.close()
 

@@ -151,7 +151,7 @@ TEST_F(JobProcessTest, AJobThatIsStoppedEndsAndTheNextOneRunsInTheSameProcess) {
         stop.get_token());
   });
   EXPECT_EQ(error.code(), ErrorCode::kCancelled);
-  EXPECT_GT(make(process_, order_of(much, 50, 0)).summary.triangles, 0U);
+  EXPECT_GT(make(process_, order_of(add_sphere(), 0)).summary.triangles, 0U);
 }
 
 // A job that cannot be interrupted ends with its process.
@@ -174,7 +174,7 @@ TEST_F(JobProcessTest, ADiskThatIsFullStopsTheJobAndIsTold) {
   order.parameters.formats = {MeshFormat::kStl};
   EXPECT_EQ(test::code_thrown_by([&] { process_.make(order, {{full}}, {}, kQuiet); }),
             ErrorCode::kOutOfSpace);
-  EXPECT_GT(make(process_, order).summary.triangles, 0U);
+  EXPECT_GT(make(process_, order_of(add_sphere(), 0)).summary.triangles, 0U);
 }
 
 class KilledIn : public JobProcessTest, public testing::WithParamInterface<Stage> {};
@@ -190,7 +190,7 @@ TEST_P(KilledIn, TheJobIsToldHowAndTheNextOneRuns) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kInternal);
   EXPECT_THAT(error->what(), HasSubstr("ended with signal 9 (killed) in the stage"));
-  EXPECT_GT(make(process_, order_of(much, 50, 0)).summary.triangles, 0U);
+  EXPECT_GT(make(process_, order_of(add_sphere(), 0)).summary.triangles, 0U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Stages, KilledIn,

@@ -123,7 +123,7 @@ TEST_F(UntangleJobs, KeepTheirWordWithinAnError) {
 
 TEST_F(UntangleJobs, AreForLabelsToo) {
   const Volume volume =
-      add(test::noise<std::uint8_t>({0, 0, 0, 1, 2}, {10, 9, 9}, 3), SampleType::kUint8);
+      add(test::noise<std::uint8_t>({0, 0, 0, 1, 2}, {8, 7, 7}, 3), SampleType::kUint8);
   for (const Smoothing smoothing : {Smoothing::kLaplacian, Smoothing::kLabels}) {
     JobParameters parameters = label_parameters({.values = {1, 2}});
     parameters.volume = volume.id;

@@ -12,6 +12,7 @@
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/exact_distance.h"
+#include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh {
@@ -125,8 +126,10 @@ TEST(Misses, AgreeWithManyDistancesOfOtherCode) {
 // another one.
 TEST(Misses, AreNoneOfSimplifiedWalls) {
   constexpr double kError = 0.2;
-  const auto volume = label_cells(5, {16, 15, 14}, 9, 31);
-  for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 4))) {
+  const auto volume = label_cells(5, {13, 12, 11}, 9, 31);
+  const auto all = all_separations(consecutive<std::int64_t>(1, 4));
+  for (std::size_t n = 0; n < all.size(); n += test::kStep) {
+    const SeparateOptions& options = all[n];
     const SeparatingSurface original = separated(volume, options);
     SeparatingSurface surface = separated(volume, options);
     smooth({.steps = test::means(5, {0.5}), .max_displacement_mm = kError / 2}, {}, surface.mesh);

@@ -3,7 +3,7 @@ import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { titleOf } from '../openapi';
 import { hues, silhouette, type Silhouette } from './seen';
-import { ballNrrd, ballsNrrd, boxOf, holdMeshes, type JobAnswer, madeJob, measured, noted, openedJob, openSurface, setup, still, surfaceLoaded } from './support';
+import { ballNrrd, ballsNrrd, boxOf, holdMeshes, type JobAnswer, madeJob, measured, noted, openedJob, openSurface, settled, setup, still, surfaceLoaded } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -95,14 +95,15 @@ describe('distances', () => {
     const ruler = await measured(page, 40);
     await page.keyboard.press('c');
     await still(page);
-    const before = ['cut', 'rulers', 'cam'].map((name) => noted(page, name));
+    const looks = (): string => ['cut', 'rulers', 'cam'].map((name) => noted(page, name)).join(' ');
+    const before = await settled(page, looks);
     const address = new URL(page.url()).hash.split('?')[0];
     await page.getByRole('button', { name: 'Show the distance as colour' }).click();
     await page.locator('.legend').waitFor();
     await still(page);
     // Measured, with the way of looking as before.
     expect(new URL(page.url()).hash.split('?')[0]).toBe(address);
-    expect(['cut', 'rulers', 'cam'].map((name) => noted(page, name))).toEqual(before);
+    await expect.poll(looks).toBe(before);
     expect(await page.locator('.ruler-labels span').innerText()).toBe(ruler);
     expect((await openedJob(at)).parameters.distances).not.toBe(true);
     // As the address says, of what was measured then.

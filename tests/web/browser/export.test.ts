@@ -44,8 +44,8 @@ describe('a surface', () => {
     const made = await madeJob(at);
     expect(made.mesh?.components).toBe(1);
     expect(made.mesh?.certificate).toMatchObject({ proven: true });
+    await expect.poll(() => page.locator('.print-check [data-state=good]').count()).toBe(5);
     expect(await page.locator('.print-check [data-state=bad]').count()).toBe(0);
-    expect(await page.locator('.print-check [data-state=good]').count()).toBe(5);
     const text = await page.locator('.print-check').innerText();
     expect(text).toMatch(/One connected component/);
     expect(text).toMatch(/Nowhere more than 0\.\d+ mm from the scan. This is proven/);

@@ -42,7 +42,7 @@ describe('the list of jobs', () => {
     await expect.poll(() => rows.count()).toBe(5);
     await page.getByRole('searchbox').fill('iso 91');
     await expect.poll(() => rows.count()).toBe(1);
-    expect(noted(page, 'search')).toBe('iso 91');
+    await expect.poll(() => noted(page, 'search')).toBe('iso 91');
     await page.getByRole('searchbox').fill('');
     await page.getByLabel('State').selectOption('failed');
     await expect.poll(() => rows.count()).toBe(0);

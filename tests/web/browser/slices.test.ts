@@ -106,7 +106,7 @@ describe('a slice', () => {
     await expect.poll(() => value.innerText()).toBe('1\u202f200');
     await expect.poll(() => canvas.getAttribute('aria-label')).toContain('11 mm, 40 to 1\u202f200');
     expect(await canvas.getAttribute('aria-label')).toContain('mean 40, SD 0, 40 to 40');
-    expect(await page.locator('.slice-profile figcaption').innerText()).toContain('greatest 1\u202f200');
+    await expect.poll(() => page.locator('.slice-profile figcaption').innerText()).toContain('greatest 1\u202f200');
     await canvas.press('i');
     await expect.poll(() => noted(page, 'iso')).toBe('1200');
   });
@@ -116,7 +116,7 @@ describe('a slice', () => {
     const box = await boxOf(page.locator('[data-plane=axial] canvas'));
     const scale = (Math.min(box.width, box.height) - 28) / 48;
     const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-    const before = noted(page, 'window');
+    const before = await settled(page, () => noted(page, 'window'));
     await drag(page, [x, y], [x + 6 * scale, y + 3 * scale]);
     // The address has the last place soon.
     await expect.poll(() => noted(page, 'at').split(',').map((one, axis) => Math.abs(Math.abs(Number(one) - 24) - ([6, 3, 0][axis] ?? 0)) <= 1)).toEqual([true, true, true]);
@@ -388,6 +388,6 @@ describe('parameters', () => {
     const volume = await daemon.upload(Buffer.concat([Buffer.from(header), Buffer.from(samples.buffer)]));
     await page.goto(`${daemon.url}/#/volumes/${volume}`);
     await expect.poll(() => page.locator('.iso-input').inputValue()).toMatch(/^\d{5}(\.\d)?$/);
-    expect(noted(page, 'iso')).toBe(await page.locator('.iso-input').inputValue());
+    await expect.poll(() => noted(page, 'iso')).toBe(await page.locator('.iso-input').inputValue());
   });
 });

@@ -134,6 +134,27 @@ export function startBrowser(): Promise<Browser> {
 
 export const slowest = 90_000;
 
+// Tells in `window.timers` which of the page's timers are to run within a second.
+function noteTimers(page: Page): Promise<void> {
+  return page.addInitScript(() => {
+    const [set, clear] = [window.setTimeout.bind(window), window.clearTimeout.bind(window)];
+    const timers = new Set<number>();
+    const setTimeout = (run: (...given: unknown[]) => void, time = 0, ...given: unknown[]): number => {
+      const timer = set(() => {
+        timers.delete(timer);
+        run(...given);
+      }, time);
+      if (time < 1000) timers.add(timer);
+      return timer;
+    };
+    const clearTimeout = (timer: number): void => {
+      timers.delete(timer);
+      clear(timer);
+    };
+    Object.assign(window, { timers, setTimeout, clearTimeout });
+  });
+}
+
 export interface OpenPage {
   page: Page;
   // Faults that no test provokes: exceptions, what the content policy blocked, foreign hosts.
@@ -146,6 +167,7 @@ export async function openPage(
   options: Parameters<Browser['newPage']>[0] = {},
 ): Promise<OpenPage> {
   const page = await browser.newPage({ viewport: { width: 1180, height: 760 }, ...options });
+  await noteTimers(page);
   // A machine with other things to do may take long; what never comes still fails.
   page.setDefaultTimeout(slowest);
   page.setDefaultNavigationTimeout(slowest);
@@ -381,14 +403,20 @@ export function pause(page: Page, milliseconds: number): Promise<void> {
   return page.evaluate((time) => new Promise((resolve) => setTimeout(resolve, time)), milliseconds);
 }
 
+// Waits until surfaces rest and no timer of less than a second is left: the page has noted then what it was at.
+async function quiet(page: Page): Promise<void> {
+  await still(page);
+  await expect.poll(() => page.evaluate(() => (window as unknown as { timers: Set<number> }).timers.size)).toBe(0);
+}
+
 // The value that no longer changes.
 export async function settled<T>(page: Page, read: () => T | Promise<T>): Promise<T> {
-  const seen = [await read()];
+  const seen: T[] = [];
   await expect
     .poll(async () => {
-      await pause(page, 1000); // longer than the page waits before it notes its place
+      await quiet(page);
       seen.push(await read());
-      return seen.at(-1) === seen.at(-2);
+      return seen.length > 1 && seen.at(-1) === seen.at(-2);
     })
     .toBe(true);
   return seen.at(-1) as T;

@@ -164,7 +164,7 @@ describe('an upload of several volumes', () => {
     await slider.focus();
     for (let step = 0; step < 3; step += 1) await page.keyboard.press('ArrowRight');
     await expect.poll(() => choice.innerText()).toContain('4 of 5');
-    expect(await brightness()).toBeGreaterThan(before);
+    await expect.poll(brightness).toBeGreaterThan(before);
     await page.getByRole('button', { name: 'Use this one' }).click();
     await page.waitForURL(volumePage);
     const id = /volumes\/([0-9a-f]+)/.exec(page.url())?.[1] ?? '';
