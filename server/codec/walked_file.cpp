@@ -26,10 +26,6 @@ bool is_walked(MeshFormat format, const MeshParameters& parameters) {
          !parameters.distances && parameters.lods.size() <= 1;
 }
 
-bool is_set_aside(MeshFormat format, const MeshParameters& parameters) {
-  return format == MeshFormat::kGlb && is_plain(parameters);
-}
-
 std::uint32_t walked_depth(MeshFormat format, const MeshParameters& parameters,
                            const mesh::SurfaceSize& size) {
   if (format != MeshFormat::kGlb || is_plain(parameters)) return 0;

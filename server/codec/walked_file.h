@@ -50,10 +50,6 @@ struct WalkedContent {
 // the surface as a whole. The bytes are the same.
 bool is_walked(MeshFormat format, const MeshParameters& parameters);
 
-// True if all of such a file is set aside before its first byte: that costs more time than a small
-// surface as a whole does.
-bool is_set_aside(MeshFormat format, const MeshParameters& parameters);
-
 // How many layers the windows need to have; 0: it does not matter.
 std::uint32_t walked_depth(MeshFormat format, const MeshParameters& parameters,
                            const mesh::SurfaceSize& size);

@@ -142,16 +142,11 @@ bool can_be_walked(const MeshParameters& parameters, const Measures& measures) {
 
 bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
                const Measures& measures) {
+  // Measured with two threads: a walk through the head's 1.8 million triangles, which take less
+  // than 100 MiB as a whole, takes 1.1 (STL) to 1.4 times (GLB) as long as the whole.
   constexpr std::uint64_t kFewTriangles = std::uint64_t{1} << 21;
-  if (!can_be_walked(parameters, measures)) return false;
-  const bool is_set_aside = std::ranges::any_of(files_of(parameters), [&](MeshFormat format) {
-    return codec::is_set_aside(format, parameters);
-  });
-  if (is_set_aside && surface.triangles < kFewTriangles) return false;
-  if (surface.triangles >= kFewTriangles) return !takes_more_walked(surface, parameters);
-  const std::uint64_t depth = walk_options({}, parameters, surface).depth;
-  const auto threads = static_cast<std::uint64_t>(mesh::thread_count());
-  return threads == 1 || depth == 0 || surface.layers >= 2 * threads * depth;
+  return can_be_walked(parameters, measures) && surface.triangles >= kFewTriangles &&
+         !takes_more_walked(surface, parameters);
 }
 
 bool removes_stairs(const MeshParameters& parameters) {

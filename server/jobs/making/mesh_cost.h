@@ -25,8 +25,7 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 // written as triangles come, and nothing else needs the surface as a whole.
 bool can_be_walked(const MeshParameters& parameters, const Measures& measures);
 
-// True if such a job is made so. A small surface of few windows would not keep all threads busy,
-// one whose file is set aside first would take longer, and a large one of few layers would take
+// True if such a job is made so. A small surface would take longer, and a large one of few layers
 // more memory: it is made as a whole, which gives the same.
 bool is_walked(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
                const Measures& measures);

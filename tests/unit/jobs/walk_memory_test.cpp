@@ -56,7 +56,7 @@ class WatchedSpool : public SpoolFile {
 // So many times the same layers, and one whose surface is many times as large.
 std::vector<std::uint8_t> stacked(std::uint32_t times, std::uint32_t side, std::uint32_t layers) {
   const auto once =
-      test::sample<std::uint8_t>(test::scaled(test::gyroid(40), 50, 128), {side, side, layers});
+      test::sample<std::uint8_t>(test::scaled(test::gyroid(16), 50, 128), {side, side, layers});
   std::vector<std::uint8_t> all;
   for (std::uint32_t n = 0; n < times; ++n) {
     all.insert(all.end(), once.samples.begin(), once.samples.end());
