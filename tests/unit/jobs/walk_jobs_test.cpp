@@ -36,29 +36,25 @@ class WalkJobs : public test::PipelineFixture {};
 TEST_F(WalkJobs, WriteAndTellWhatIsMadeOfTheWholeSurface) {
   const Volume volume =
       add(test::noise<std::uint8_t>({0, 1, 2, 9}, {100, 90, 80}, 9), SampleType::kUint8);
-  std::vector<JobParameters> ways(2, parameters_of(volume, 1));
-  ways[0].close = true;
-  ways[0].smoothing = Smoothing::kTaubin;
-  ways[0].max_displacement_mm = 0.1;
-  ways[0].normals = false;
-  ways[1].passes = 0;
-  ways[1].space = Space::kRas;
-  ways[1].glb_codec = GlbCodec::kKhrMeshopt;
-  for (JobParameters& way : ways) {
-    way.formats = {MeshFormat::kStl, MeshFormat::kGlb};
-    const MeshSummary walked = run(volume, way).mesh;
-    constexpr std::uint64_t kLayers = 80;
-    ASSERT_TRUE(is_walked(
-        test::even_surface(kLayers, walked.vertices / kLayers, walked.triangles / kLayers), way,
-        {}));
-    way.formats.push_back(MeshFormat::kOff);
-    ASSERT_FALSE(can_be_walked(way, {}));
-    const MeshSummary whole = run(volume, way).mesh;
-    for (const MeshFormat format : {MeshFormat::kStl, MeshFormat::kGlb}) {
-      EXPECT_EQ(walked.files.at(format).sha256, whole.files.at(format).sha256);
-    }
-    EXPECT_EQ(without_files(walked), without_files(whole));
+  JobParameters parameters = parameters_of(volume, 1);
+  parameters.close = true;
+  parameters.smoothing = Smoothing::kTaubin;
+  parameters.max_displacement_mm = 0.1;
+  parameters.space = Space::kRas;
+  parameters.glb_codec = GlbCodec::kKhrMeshopt;
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kGlb};
+  const MeshSummary walked = run(volume, parameters).mesh;
+  constexpr std::uint64_t kLayers = 80;
+  ASSERT_TRUE(
+      is_walked(test::even_surface(kLayers, walked.vertices / kLayers, walked.triangles / kLayers),
+                parameters, {}));
+  parameters.formats.push_back(MeshFormat::kOff);
+  ASSERT_FALSE(can_be_walked(parameters, {}));
+  const MeshSummary whole = run(volume, parameters).mesh;
+  for (const MeshFormat format : {MeshFormat::kStl, MeshFormat::kGlb}) {
+    EXPECT_EQ(walked.files.at(format).sha256, whole.files.at(format).sha256);
   }
+  EXPECT_EQ(without_files(walked), without_files(whole));
 }
 
 TEST(CanBeWalked, OnlyWithoutWhatNeedsTheWholeSurface) {
