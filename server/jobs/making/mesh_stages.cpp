@@ -226,10 +226,12 @@ void thickness_stage(const MeshRequest& request, std::size_t surfaces, const Mak
   progress.enter(Stage::kThickness);
   Thickness& all = summary.thickness.emplace();
   const double part = 1 / static_cast<double>(surfaces);
+  double area = summary.labels.empty() ? summary.area_mm2 : 0;
+  for (const LabelSummary& label : summary.labels) area += label.area_mm2;
   for (std::size_t n = 0; n < surfaces; ++n) {
     const auto begin = static_cast<double>(n);
-    const Thickness one = measure_thickness(
-        surface(n), *least, progress.context().part(part * begin, part * (begin + 1)));
+    const mesh::Context context = progress.context().part(part * begin, part * (begin + 1));
+    const Thickness one = measure_thickness(surface(n), *least, area, context);
     all.thin_area_mm2 += one.thin_area_mm2;
     if (!one.thinnest_mm || all.thinnest_mm.value_or(*one.thinnest_mm) < *one.thinnest_mm) continue;
     all.thinnest_mm = one.thinnest_mm;

@@ -15,6 +15,8 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr std::size_t kTrianglesPerBlock = 256;
+// More take longer than a head's own triangles.
+constexpr double kParts = 1e6;
 
 Point moved(const Point& from, const Point& direction, double way) {
   return {from[0] + way * direction[0], from[1] + way * direction[1], from[2] + way * direction[2]};
@@ -54,16 +56,11 @@ struct Block {
 
 class Walls {
  public:
-  Walls(const SurfaceView& surface, double below_mm, const Context& context)
-      : surface_(surface), grid_(surface, context), below_mm_(below_mm) {
-    constexpr double kParts = 1e6;
-    double area = 0;
-    for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
-      const auto [a, b, c] = corners_of(surface, t);
-      const Point normal = normal_of(a, b, c);
-      area += std::sqrt(dot(normal, normal)) / 2;
-    }
-    side_mm_ = std::max(below_mm / 2, std::sqrt(2 * area / kParts));
+  Walls(const SurfaceView& surface, double below_mm, double area_mm2, const Context& context)
+      : surface_(surface),
+        grid_(surface, context),
+        below_mm_(below_mm),
+        side_mm_(std::max(below_mm / 2, std::sqrt(2 * area_mm2 / kParts))) {
     Reach reach;
     for (const Vec3& position : surface.positions) reach.add({position, position});
     if (reach.is_empty()) return;
@@ -149,15 +146,16 @@ class Walls {
   const SurfaceView surface_;
   const TriangleGrid grid_;
   const double below_mm_;
-  double side_mm_ = 0;                   // of a part of a triangle, about
+  const double side_mm_;                 // of a part of a triangle, about
   std::atomic<double> thinnest_mm_ = 0;  // so far; thicker places are of no interest
 };
 
 }  // namespace
 
-Thickness measure_thickness(const SurfaceView& surface, double below_mm, const Context& context) {
+Thickness measure_thickness(const SurfaceView& surface, double below_mm, double area_mm2,
+                            const Context& context) {
   constexpr double kIndex = 0.3;  // of the time
-  Walls walls(surface, below_mm, context.part(0, kIndex));
+  Walls walls(surface, below_mm, area_mm2, context.part(0, kIndex));
   std::vector<Block> blocks(chunks_of(surface.triangles.size(), kTrianglesPerBlock));
   const auto measure = [&](std::size_t begin, std::size_t end) {
     blocks[begin / kTrianglesPerBlock] = walls.measure(begin, end, context);

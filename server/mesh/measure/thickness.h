@@ -16,12 +16,13 @@ namespace isomesh::mesh {
 // An edge is no wall either: nearer than `below_mm` to a corner or an edge that both triangles
 // have, there is no thickness. Rough surfaces have edges of any angle, which would hide thin walls.
 //
-// Points are the centres of triangles. Triangles that are large beside the others, or beside
-// `below_mm`, are divided, into some two million parts in all at most. So what is narrower than
-// these parts may be missed.
+// Points are the centres of triangles. Triangles that are larger than `below_mm` are divided, so
+// that there are about a million points more in surfaces of `area_mm2` together, at most. What is
+// narrower than these parts may be missed.
 //
 // Does not depend on the number of threads. Takes the memory of TriangleGrid. Throws Error
 // kUnusableVolume for a position that is not finite, kTooLarge as TriangleGrid, and kCancelled.
-Thickness measure_thickness(const SurfaceView& surface, double below_mm, const Context& context);
+Thickness measure_thickness(const SurfaceView& surface, double below_mm, double area_mm2,
+                            const Context& context);
 
 }  // namespace isomesh::mesh

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <initializer_list>
 #include <limits>
 #include <numbers>
@@ -9,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/measure/point_triangle.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
@@ -98,7 +100,13 @@ Body inside_out(Body body) {
 }
 
 Thickness thickness_of(const Body& body, double below_mm) {
-  return measure_thickness(body.view(), below_mm, {});
+  double area = 0;
+  for (std::size_t t = 0; t < body.triangles.size(); ++t) {
+    const auto [a, b, c] = corners_of(body.view(), t);
+    const Point normal = normal_of(a, b, c);
+    area += std::sqrt(dot(normal, normal)) / 2;
+  }
+  return measure_thickness(body.view(), below_mm, area, {});
 }
 
 double thinnest_of(const Body& body, double below_mm = 0.4) {
@@ -198,12 +206,22 @@ TEST(Thickness, IsTheSameOnAnyThreads) {
   EXPECT_GT(found.thin_area_mm2, 1);
 }
 
+// A large body leaves fewer points to others, so a cavity below a large side is seen from its own
+// side alone.
+TEST(Thickness, HasFewerPointsOfTrianglesBesideMuchLargerSurfaces) {
+  Body body = box_between({0, 0, 0}, {10, 10, 10});
+  body.add(inside_out(box_between({1, 1, 8.8}, {2, 2, 9.8})));
+  EXPECT_NEAR(thickness_of(body, 0.4).thin_area_mm2, 2, 0.3);
+  constexpr double kMuchLarger = 1e12;
+  EXPECT_NEAR(measure_thickness(body.view(), 0.4, kMuchLarger, {}).thin_area_mm2, 1, 1e-3);
+}
+
 TEST(Thickness, StopsAndRefusesWhatIsNotFinite) {
   std::stop_source stop;
   stop.request_stop();
   const Body body = box_between({0, 0, 0}, {1, 1, 1});
   EXPECT_EQ(test::code_thrown_by([&] {
-              measure_thickness(body.view(), 0.4, {stop.get_token(), nullptr});
+              measure_thickness(body.view(), 0.4, 6, {stop.get_token(), nullptr});
             }),
             ErrorCode::kCancelled);
   Body broken = body;
