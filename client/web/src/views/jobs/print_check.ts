@@ -1,5 +1,5 @@
 // A list of what to know before a surface is printed, in plain words, and of what helps where it is not ready.
-import type { Job, Vec3 } from '../../api/types';
+import type { Job, MeshSummary, Vec3 } from '../../api/types';
 import { isForPrinter, nozzle } from '../../job/printing';
 import { isByLabels } from '../../job/table';
 import { makeVariant } from '../../job/variants';
@@ -15,6 +15,20 @@ const marks: Record<State, readonly [string, string]> = { good: ['\u2713', 'Good
 function point(state: State, ...text: Child[]): HTMLElement {
   const [mark, words] = marks[state];
   return h('li', { 'data-state': state }, [h('span.mark', { 'aria-hidden': 'true' }, mark), h('span', h('span.sr-only', words), ...text)]);
+}
+
+// The thickness of walls against the width of the nozzle.
+function wallPoint(parameters: Job['parameters'], mesh: MeshSummary, measure: (width: number) => HTMLElement, show: (places: readonly Vec3[]) => void): HTMLElement {
+  const width = parameters.min_thickness_mm ?? nozzle;
+  if (!mesh.thickness) return point('told', 'Thin walls are not measured. ', measure(width));
+  const { place, thinnest_mm: thinnest, thin_area_mm2: area } = mesh.thickness;
+  const isThin = thinnest !== null && thinnest < width;
+  const nozzles = `the nozzle's ${formatNumber(width, 3)} mm`;
+  // Two labels have the area between them together, and each its own walls.
+  const share = isByLabels(parameters) ? '' : ` (${formatNumber((100 * area) / mesh.area_mm2)} %)`;
+  // Rough surfaces have a wall of nearly nothing somewhere: how much is thin tells more.
+  const text = isThin ? `Walls below ${nozzles}: ${formatSize(area)} mm\u00b2 of the surface${share}. The thinnest is ${thinnestText(mesh)}. ` : `Thinnest wall: ${thinnestText(mesh)}, no less than ${nozzles}. `;
+  return point(isThin ? 'bad' : 'good', text, place && button('Show it', () => show([place]), { class: 'link', title: 'Marks it on the surface' }));
 }
 
 // Null for a surface that was not made for a printer. `show` goes to places on the surface and marks them.
@@ -56,20 +70,8 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
         : point('told', `Up to ${millimetres(found)} mm from the scan, as measured at points. This is not proven.`),
     );
   }
-  const { thickness } = mesh;
-  const width = parameters.min_thickness_mm ?? nozzle;
-  if (!thickness) {
-    points.push(point('told', 'Thin walls are not measured. ', remedy('Measure them', 'Starts a job that finds walls below the width of your nozzle', { min_thickness_mm: width })));
-  } else {
-    const { place, thinnest_mm: thinnest, thin_area_mm2: area } = thickness;
-    const isThin = thinnest !== null && thinnest < width;
-    const nozzles = `the nozzle's ${formatNumber(width, 3)} mm`;
-    // Two labels have the area between them together, and each its own walls.
-    const share = isByLabels(parameters) ? '' : ` (${formatNumber((100 * area) / mesh.area_mm2)} %)`;
-    // Rough surfaces have a wall of nearly nothing somewhere: how much is thin tells more.
-    const text = isThin ? `Walls below ${nozzles}: ${formatSize(area)} mm\u00b2 of the surface${share}. The thinnest is ${thinnestText(mesh)}. ` : `Thinnest wall: ${thinnestText(mesh)}, no less than ${nozzles}. `;
-    points.push(point(isThin ? 'bad' : 'good', text, place && button('Show it', () => show([place]), { class: 'link', title: 'Marks it on the surface' })));
-  }
+  const measure = (width: number): HTMLElement => remedy('Measure them', 'Starts a job that finds walls below the width of your nozzle', { min_thickness_mm: width });
+  points.push(wallPoint(parameters, mesh, measure, show));
   const [low, high] = mesh.bounds;
   const size = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');
   const material = mesh.quality.encloses_volume ? `, ${formatNumber(mesh.volume_mm3.smoothed / 1000, 2)} cm\u00b3 if it is filled` : '';
