@@ -15,6 +15,7 @@
 #include "server/net/tls_context.h"
 #include "server/process/child.h"
 #include "tests/support/files.h"
+#include "tests/support/process.h"
 
 namespace isomesh::c_store {
 namespace {
@@ -147,7 +148,7 @@ TEST_F(TlsRelayTest, CarriesBothWaysAndTellsTheName) {
   send_all(response, "the end");
   std::array<char, 7> answer = {};
   ASSERT_EQ(::recv(request.number(), answer.data(), answer.size(), MSG_WAITALL), 7);
-  EXPECT_TRUE(there->has_answered());
+  EXPECT_TRUE(test::eventually([&] { return there->has_answered(); }));
   std::string rest(much.size() - 1, ' ');
   EXPECT_EQ(::recv(response.number(), rest.data(), rest.size(), MSG_WAITALL),
             static_cast<ssize_t>(rest.size()));
