@@ -85,7 +85,8 @@ std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& optio
 }
 
 double milliseconds_between(std::int64_t begin_us, std::int64_t end_us) {
-  return static_cast<double>(std::max<std::int64_t>(end_us - begin_us, 1)) / 1000;
+  // As floating point, because the difference of times in damaged rows may not fit in 64 bits.
+  return std::max(static_cast<double>(end_us) - static_cast<double>(begin_us), 1.0) / 1000;
 }
 
 void start_run(Job& job, std::int64_t accepted_us, std::int64_t now_us) {
