@@ -169,7 +169,7 @@ void SurfaceWindows::write_whole(const Context& context, Mesh& mesh) {
 }
 
 WritingMemory writing_memory(const ExtractOptions& options, std::uint64_t plane_samples) {
-  // What is known of cells, and rows around the plane.
+  // The codes of cells, and rows around the plane.
   constexpr std::uint64_t kOfCells = 4;
   // Measured: 10.4 bytes on an average.
   constexpr std::uint64_t kJoinedPerVertex = 12;

@@ -71,8 +71,8 @@ class SurfaceWindows : public LayerSource {
   std::unique_ptr<IndexMemory> memory_;
 };
 
-// What it takes to write windows, in bytes: for each thread, and for each vertex of the windows in
-// memory, if what is joined comes from a spool. Volumes' planes have so many samples.
+// The memory in which windows are written, in bytes: for each thread, and for each vertex of the
+// windows in memory, if what is joined comes from a spool. Volumes' planes have so many samples.
 struct WritingMemory {
   std::uint64_t thread_bytes = 0;
   std::uint64_t vertex_bytes = 0;

@@ -1,4 +1,5 @@
-// What there is of each value of the samples, and the number of its part; private to the kernels.
+// Each value of the samples with what is counted of it, or the number of its part; private to the
+// kernels.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What the walk that writes needs of labels, as regular-inl.h has it for an iso-value. Compiled
+// The field of labels for the walk that writes, as regular-inl.h has that of an iso-value. Compiled
 // once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_LABEL_WRITER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_LABEL_WRITER_INL_H_

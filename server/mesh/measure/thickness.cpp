@@ -22,9 +22,9 @@ Point moved(const Point& from, const Point& direction, double way) {
   return {from[0] + way * direction[0], from[1] + way * direction[1], from[2] + way * direction[2]};
 }
 
-// Where the line from a point meets the triangle: T. Möller, B. Trumbore, "Fast, minimum storage
-// ray/triangle intersection", 1997. A little wider than the triangle, so that no line passes
-// between two. Empty behind the point.
+// The way along the line from a point to the triangle: T. Möller, B. Trumbore, "Fast, minimum
+// storage ray/triangle intersection", 1997. A little wider than the triangle, so that no line
+// passes between two. Empty behind the point.
 std::optional<double> way_to(const Corners& triangle, const Point& from, const Point& direction) {
   constexpr double kWider = 1e-9;
   const Point ab = minus(triangle[1], triangle[0]);

@@ -87,8 +87,7 @@ TYPED_TEST(BccFrom, NoiseIsTheReferencesSurface) {
   constexpr std::array kDims = {Dims{9, 2, 3},  Dims{9, 9, 9},  Dims{2, 2, 9},
                                 Dims{65, 4, 3}, Dims{4, 5, 6},  Dims{3, 9, 2},
                                 Dims{64, 3, 4}, Dims{66, 3, 3}, Dims{129, 3, 3}};
-  // What depends on the size of a volume does not on the type of its samples: a third of them for
-  // most types.
+  // The sizes show the same for each type of samples, so most types have a third of them.
   constexpr bool kIsForAll = std::is_same_v<T, std::uint8_t> || std::is_same_v<T, float>;
   constexpr std::size_t kEvery = test::kStep * (kIsForAll ? 1 : 3);
   for (std::size_t n = sizeof(T) % kEvery; n < kDims.size(); n += kEvery) {
