@@ -181,12 +181,21 @@ SeriesQuery series_query_of(const Request& request) {
   return query;
 }
 
-void search(Orders* orders, const Request& request, Response& response) {
+void search_pacs(Orders* orders, const Request& request, Response& response) {
   check_known(request, {"patient_id", "patient_name", "date", "modality", "study", "limit"});
   Orders& all = configured(orders);
   const SeriesQuery query = series_query_of(request);
-  answer_json(response, 200,
-              to_json(all.search(orderer_of(request), request.path_parameter("name"), query)));
+  try {
+    answer_json(response, 200,
+                to_json(all.search(orderer_of(request), request.path_parameter("name"), query)));
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kPacsUnreachable) throw;
+    // Clients repeat for minutes what a busy server refuses (503). A person waits for this.
+    constexpr int kBadGateway = 502;
+    Problem problem = to_problem(error, request.path);
+    problem.status = kBadGateway;
+    throw RecordedProblem(problem);
+  }
 }
 
 }  // namespace
@@ -208,7 +217,7 @@ void add_order_routes(App& app, Orders* orders) {
   add_get(app, "/v1/pacs",
           [orders](const auto& request, auto& response) { pacs(orders, request, response); });
   add_computed_get(app, "/v1/pacs/{name}/series", [orders](const auto& request, auto& response) {
-    search(orders, request, response);
+    search_pacs(orders, request, response);
   });
 }
 

@@ -20,21 +20,20 @@ inline std::string replaced(std::string text, const std::string& from, const std
   return found == std::string::npos ? text : text.replace(found, from.size(), to);
 }
 
-// A hospital with a PACS that does not answer, and one that first finds nothing and then rejects
-// everything.
+// A hospital with a PACS that does not answer, and one that finds nothing.
 class HospitalFile {
  public:
   HospitalFile() {
     write_file(folder_ / "hospital.toml",
                "[worklist]\n[[pacs]]\nname = \"absent\"\ndicomweb = \"http://127.0.0.1:1/\"\n"
-               "[[pacs]]\nname = \"strict\"\ndicomweb = \"" +
+               "[[pacs]]\nname = \"empty\"\ndicomweb = \"" +
                    pacs_.url() + "\"\n");
   }
   std::string path() const { return folder_ / "hospital.toml"; }
 
  private:
   TemporaryFolder folder_;
-  const Receiver pacs_{{404, 403}};
+  const Receiver pacs_{{404}};
 };
 
 class OpenApiTest : public testing::Test {

@@ -33,17 +33,30 @@ FoundSeries series_of(const PeersObject& object) {
           .instances = object.instances};
 }
 
+// A value in which wildcards are allowed. Orthanc takes encoded characters literally, and other
+// servers reject a ^ that is not encoded, so * stands for what separates the parts of a name.
+std::string encoded_pattern(std::string_view pattern) {
+  std::string text;
+  for (const char& letter : pattern) {
+    const bool is_wildcard = letter == '*' || letter == '?';
+    text += is_wildcard                      ? std::string(1, letter)
+            : letter == '^' || letter == ' ' ? "*"
+                                             : percent_encode({&letter, 1});
+  }
+  return text;
+}
+
 // The query of a search for studies.
 std::string studies_query(const SeriesQuery& query) {
   std::string text = '?' + std::string(kStudyFields);
-  for (const auto& [name, value] :
-       {std::pair<const char*, const std::string&>("PatientID", query.patient_id),
-        {"PatientName", query.patient_name},
-        {"StudyDate", query.date},
-        {"ModalitiesInStudy", query.modality},
-        {"StudyInstanceUID", query.study}}) {
-    if (!value.empty()) text.append("&").append(name).append("=").append(percent_encode(value));
-  }
+  const auto add = [&text](const char* name, const std::string& value) {
+    if (!value.empty()) text.append("&").append(name).append("=").append(value);
+  };
+  add("PatientID", encoded_pattern(query.patient_id));
+  add("PatientName", encoded_pattern(query.patient_name));
+  add("StudyDate", percent_encode(query.date));
+  add("ModalitiesInStudy", percent_encode(query.modality));
+  add("StudyInstanceUID", percent_encode(query.study));
   return text;
 }
 

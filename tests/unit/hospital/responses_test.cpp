@@ -96,7 +96,7 @@ TEST(SearchOfAPerson, FindsStudiesAndThenTheirSeries) {
   EXPECT_EQ(all.series[1].patient_name, "名^前");
   EXPECT_EQ(all.series[2].series_description, std::string(256, 'a'));
   EXPECT_EQ(all.series[3].patient_name, "Doe^Jane");
-  EXPECT_EQ(pacs.asked("PatientName"), "D*e^J&=");
+  EXPECT_EQ(pacs.asked("PatientName"), "D*e*J&=");
   EXPECT_EQ(pacs.asked("StudyDate"), "20261101-20261130");
   EXPECT_EQ(pacs.asked("ModalitiesInStudy"), "CT");
   EXPECT_EQ(pacs.asked("PatientID"), "");
