@@ -1,11 +1,14 @@
 #include "server/hospital/routes.h"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "base/sha256.h"
+#include "base/text.h"
+#include "proto/dicom_uid.h"
 #include "server/hospital/limits.h"
 #include "server/hospital/protocol/orders.h"
 #include "server/http/requests/request_values.h"
@@ -123,6 +126,78 @@ void pacs(Orders* orders, const Request& request, Response& response) {
   answer_json(response, 200, to_json(configured(orders).pacs()));
 }
 
+// The value of a parameter, without spaces around it; "" if it is missing.
+std::string short_text_of(const Request& request, const std::string& name) {
+  constexpr std::size_t kLongest = 200;
+  const std::string value(trimmed(request.parameter(name)));
+  // DICOM separates values by backslashes: this would be a search for several.
+  if (value.size() > kLongest || has_control_characters(value) || value.find('\\') != value.npos) {
+    throw invalid_parameter(name, "must be one value of at most 200 characters");
+  }
+  return value;
+}
+
+bool is_range_of_days(std::string_view text) {
+  const auto is_day = [](std::string_view day) {
+    constexpr std::size_t kDigits = 8;
+    return day.size() == kDigits && is_digits(day);
+  };
+  const std::size_t dash = text.find('-');
+  if (dash == text.npos) return is_day(text);
+  const std::string_view first = text.substr(0, dash);
+  const std::string_view last = text.substr(dash + 1);
+  return (first.empty() || is_day(first)) && (last.empty() || is_day(last)) &&
+         !(first.empty() && last.empty());
+}
+
+bool is_modality(std::string_view text) {
+  constexpr std::size_t kLongest = 16;
+  return text.size() <= kLongest && std::ranges::all_of(text, [](char letter) {
+           return (letter >= 'A' && letter <= 'Z') || (letter >= '0' && letter <= '9') ||
+                  letter == '_';
+         });
+}
+
+SeriesQuery series_query_of(const Request& request) {
+  constexpr WholeNumbers kStudies = {1, 100};
+  constexpr std::uint64_t kUsualStudies = 20;
+  const SeriesQuery query = {.patient_id = short_text_of(request, "patient_id"),
+                             .patient_name = short_text_of(request, "patient_name"),
+                             .date = short_text_of(request, "date"),
+                             .modality = short_text_of(request, "modality"),
+                             .study = short_text_of(request, "study"),
+                             .limit = whole_number_of(request, "limit", kStudies, kUsualStudies)};
+  if (!query.date.empty() && !is_range_of_days(query.date)) {
+    throw invalid_parameter("date",
+                            "must be a day such as 20261130, or days such as 20261101-20261130, "
+                            "20261101- and -20261130");
+  }
+  if (!is_modality(query.modality)) {
+    throw invalid_parameter("modality", "must be one such as CT, in capital letters");
+  }
+  if (!query.study.empty() && !is_uid(query.study)) {
+    throw invalid_parameter("study", "must be a UID: digits and dots, at most 64");
+  }
+  return query;
+}
+
+void search_pacs(Orders* orders, const Request& request, Response& response) {
+  check_known(request, {"patient_id", "patient_name", "date", "modality", "study", "limit"});
+  Orders& all = configured(orders);
+  const SeriesQuery query = series_query_of(request);
+  try {
+    answer_json(response, 200,
+                to_json(all.search(orderer_of(request), request.path_parameter("name"), query)));
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kPacsUnreachable) throw;
+    // Clients repeat for minutes what a busy server refuses (503). A person waits for this.
+    constexpr int kBadGateway = 502;
+    Problem problem = to_problem(error, request.path);
+    problem.status = kBadGateway;
+    throw RecordedProblem(problem);
+  }
+}
+
 }  // namespace
 
 void add_order_routes(App& app, Orders* orders) {
@@ -141,6 +216,9 @@ void add_order_routes(App& app, Orders* orders) {
            [orders](const auto& request, auto& response) { retry(orders, request, response); });
   add_get(app, "/v1/pacs",
           [orders](const auto& request, auto& response) { pacs(orders, request, response); });
+  add_computed_get(app, "/v1/pacs/{name}/series", [orders](const auto& request, auto& response) {
+    search_pacs(orders, request, response);
+  });
 }
 
 }  // namespace isomesh::hospital

@@ -11,6 +11,7 @@
 #include "server/hospital/protocol/orders.h"
 #include "tests/api/daemon.h"
 #include "tests/api/schema.h"
+#include "tests/support/receiver.h"
 
 namespace isomesh::test {
 
@@ -19,17 +20,20 @@ inline std::string replaced(std::string text, const std::string& from, const std
   return found == std::string::npos ? text : text.replace(found, from.size(), to);
 }
 
-// A hospital whose PACS does not answer.
+// A hospital with a PACS that does not answer, and one that finds nothing.
 class HospitalFile {
  public:
   HospitalFile() {
     write_file(folder_ / "hospital.toml",
-               "[worklist]\n[[pacs]]\nname = \"absent\"\ndicomweb = \"http://127.0.0.1:1/\"\n");
+               "[worklist]\n[[pacs]]\nname = \"absent\"\ndicomweb = \"http://127.0.0.1:1/\"\n"
+               "[[pacs]]\nname = \"empty\"\ndicomweb = \"" +
+                   pacs_.url() + "\"\n");
   }
   std::string path() const { return folder_ / "hospital.toml"; }
 
  private:
   TemporaryFolder folder_;
+  const Receiver pacs_{{404}};
 };
 
 class OpenApiTest : public testing::Test {
@@ -54,7 +58,8 @@ class OpenApiTest : public testing::Test {
     const std::string& id = path.starts_with("/v1/volumes")  ? job_.parameters.volume
                             : path.starts_with("/v1/orders") ? order_.id
                                                              : job_.id;
-    return replaced(replaced(replaced(path, "{format}", "drc"), "{id}", id), "{uid}", "1.2.3");
+    const std::string known = replaced(replaced(path, "{format}", "drc"), "{name}", "absent");
+    return replaced(replaced(known, "{id}", id), "{uid}", "1.2.3");
   }
 
   // An order that waits for a PACS which does not answer.

@@ -239,6 +239,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"Order", to_json(order)},
       {"OrderList", to_json(std::vector{order})},
       {"PacsList", to_json(std::vector<PacsStatus>(1))},
+      {"PacsSeriesList", to_json(PacsSeriesList{.series = {PacsSeries()}})},
       {"Problem", to_json(*job.error)}};
   MemberCheck check(api_);
   for (const auto& [schema, text] : complete) {

@@ -71,6 +71,8 @@ TEST_F(TokensTest, WhatTellsNothingIsOpen) {
 TEST_F(TokensTest, ARoleReachesAsFarAsItSays) {
   EXPECT_EQ(daemon_.get("/v1/jobs", bearer(boss_)).status, 200);
   EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs", bearer(probe_)), ErrorCode::kForbidden));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/pacs/main/series?date=20261130", bearer(probe_)),
+                         ErrorCode::kForbidden));
   EXPECT_TRUE(is_problem(daemon_.get("/metrics"), ErrorCode::kUnauthorized));
   EXPECT_TRUE(is_problem(daemon_.get("/metrics", bearer(ct_)), ErrorCode::kForbidden));
   for (const std::string& token : {boss_, probe_}) {

@@ -28,7 +28,7 @@ TEST(WithoutHospital, TheOptionIsRejectedWithItsReason) {
 TEST(WithoutHospital, ThereAreNoOrders) {
   const Daemon daemon;
   EXPECT_THAT(daemon.get("/version").body, HasSubstr("\"orders\":false"));
-  for (const char* path : {"/v1/orders", "/v1/pacs"}) {
+  for (const char* path : {"/v1/orders", "/v1/pacs", "/v1/pacs/main/series?date=20261130"}) {
     EXPECT_EQ(daemon.get(path).status, 404) << path;
   }
 }

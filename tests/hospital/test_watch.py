@@ -68,6 +68,37 @@ class Watch(Loop):
         self.assertEqual(len(self.of(daemon, series)), 2)
 
 
+class Search(Loop):
+    """A person searches the PACS and orders what is found."""
+
+    def test_a_patient(self):
+        patient = f"SEARCH-{self.uid()}"
+        series = self.series(patient_id=patient, name="Sucher^Anna")
+        self.series(patient_id=patient, name="Sucher^Anna", modality="MR")
+        daemon = self.daemon()
+
+        def found(query):
+            status, _, body = daemon.call("GET", f"/v1/pacs/main/series?{query}")
+            self.assertEqual(status, 200, body)
+            self.assertTrue(body["complete"])
+            return body["series"]
+        row, = found(f"patient_id={patient}&patient_name=such*%5Eanna&modality=CT")
+        told = {name: row[name] for name in ("study", "series", "patient_id", "patient_name",
+                                             "series_description", "modality", "instances")}
+        self.assertEqual(told, {"study": series.study, "series": series.uid, "patient_id": patient,
+                                "patient_name": "Sucher^Anna", "series_description": "Head bone",
+                                "modality": "CT", "instances": 12})
+        self.succeeded(daemon, self.order(daemon, series))
+        self.assertEqual(found(f"study={row['study']}"), [row], "without the mesh")
+        self.assertEqual(len(found(f"patient_id={patient}")), 2)
+        self.assertEqual(found("patient_id=nobody"), [])
+        self.assertNotIn(patient, daemon.logged())
+        queries = [entry for entry in daemon.audit()
+                   if entry["event"] == "110112" and entry.get("patient_id") == patient]
+        self.assertEqual({(entry["pacs"], entry["outcome"]) for entry in queries},
+                         {("main", "success")})
+
+
 class Secrets(Loop):
     """HTTPS, Basic and Bearer."""
 

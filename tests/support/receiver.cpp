@@ -41,9 +41,11 @@ struct Receiver::State {
 
 Receiver::Receiver(std::vector<int> statuses) : state_(std::make_unique<State>()) {
   state_->statuses = std::move(statuses);
-  state_->http.Post(".*", [this](const httplib::Request& request, httplib::Response& response) {
+  const auto answer = [this](const httplib::Request& request, httplib::Response& response) {
     state_->answer(request, response);
-  });
+  };
+  state_->http.Get(".*", answer);
+  state_->http.Post(".*", answer);
   state_->http.set_keep_alive_max_count(1);
   state_->port = state_->http.bind_to_any_port("127.0.0.1");
   if (state_->port < 0) throw std::runtime_error("no port for a receiver");

@@ -1,4 +1,4 @@
-// A receiver of callbacks that records requests and sends configured responses.
+// A receiver of callbacks and other requests that records requests and sends configured responses.
 #pragma once
 
 #include <cstddef>

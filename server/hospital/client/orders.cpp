@@ -13,7 +13,9 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr const char* kOrders = "/v1/orders";
-constexpr seconds kLongestWait{30};  // of one request
+constexpr const char* kPacs = "/v1/pacs";
+constexpr seconds kLongestWait{30};    // of one request
+constexpr seconds kLongestSearch{30};  // of the server
 // The minimum interval between requests, for a server that answers long polls immediately.
 constexpr milliseconds kShortestLook{200};
 
@@ -70,7 +72,21 @@ Order OrderClient::retry(const std::string& id) {
 }
 
 std::vector<PacsStatus> OrderClient::pacs() {
-  return pacs_from_json(client_.ask({.path = {"/v1/pacs"}}));
+  return pacs_from_json(client_.ask({.path = {kPacs}}));
+}
+
+PacsSeriesList OrderClient::search(const std::string& pacs, const SeriesQuery& query) {
+  RouteRequest request = {.path = {kPacs, pacs, "series"}, .patience = kLongestSearch};
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) request.query.emplace_back(name, value);
+  };
+  add("patient_id", query.patient_id);
+  add("patient_name", query.patient_name);
+  add("date", query.date);
+  add("modality", query.modality);
+  add("study", query.study);
+  add("limit", query.limit ? std::to_string(*query.limit) : "");
+  return pacs_series_from_json(client_.ask(request));
 }
 
 }  // namespace isomesh

@@ -40,6 +40,8 @@ class OrderClient {
   // Restarts a failed order. Throws kNotReady for one that has not failed.
   Order retry(const std::string& id);
   std::vector<PacsStatus> pacs();
+  // Series of a PACS, the newest studies first. The query needs a patient, a date or a study.
+  PacsSeriesList search(const std::string& pacs, const SeriesQuery& query);
 
  private:
   Client& client_;

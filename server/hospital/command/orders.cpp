@@ -45,6 +45,11 @@ struct ListOptions {
   bool retries = false;
 };
 
+struct SearchOptions {
+  std::string pacs;  // empty: all are listed
+  SeriesQuery query;
+};
+
 std::string in_seconds(Seconds time) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f s", time.count());
@@ -217,7 +222,53 @@ int orders(Client& server, const Options& options, const ListOptions& asked) {
   return kDone;
 }
 
-int pacs(Client& client, const Options& options) {
+void add_search_options(CLI::App& app, SearchOptions& search) {
+  SeriesQuery& query = search.query;
+  app.add_option("PACS", search.pacs, "Name of a PACS to search for series, instead of the list");
+  const auto add = [&app](const char* name, std::string& value, const char* help,
+                          const char* type) {
+    app.add_option(name, value, help)->type_name(type)->needs("PACS");
+  };
+  add("--patient-id", query.patient_id,
+      "Patient ID; * stands for any text and ? for one character, as in the name", "ID");
+  add("--patient-name", query.patient_name, "Name as DICOM writes it: 'Doe^Jane' or 'Doe*'",
+      "NAME");
+  add("--date", query.date, "Day of the study, or days: 20261130, 20261101-20261130 or 20261101-",
+      "DAYS");
+  add("--modality", query.modality, "Modality of the series, such as CT", "NAME");
+  add("--study", query.study, "Study Instance UID", "UID");
+  app.add_option("--limit", query.limit, "Most studies (default: 20, at most 100)")->needs("PACS");
+}
+
+int search(OrderClient& client, const Options& options, const SearchOptions& asked) {
+  const PacsSeriesList found = client.search(asked.pacs, asked.query);
+  if (options.json) {
+    std::cout << to_json(found) << '\n';
+    return kDone;
+  }
+  std::vector<std::vector<std::string>> rows = {
+      {"DATE", "ID", "PATIENT", "MODALITY", "IMAGES", "STUDY", "SERIES", "UIDS"}};
+  for (const PacsSeries& each : found.series) {
+    rows.push_back({each.study_date, each.patient_id, each.patient_name, each.modality,
+                    each.instances ? std::to_string(*each.instances) : "?", each.study_description,
+                    each.series_description, each.study + ' ' + each.series});
+  }
+  if (found.series.empty()) {
+    std::cerr << "The PACS has no such series\n";
+  } else {
+    std::vector<Align> columns(rows.front().size(), Align::kLeft);
+    columns[4] = Align::kRight;
+    std::cout << in_columns(columns, std::move(rows));
+  }
+  if (!found.complete) std::cerr << "The PACS has more: search for less, or use --limit\n";
+  return kDone;
+}
+
+int pacs(Client& client, const Options& options, const SearchOptions& asked) {
+  if (!asked.pacs.empty()) {
+    OrderClient orders(client);
+    return search(orders, options, asked);
+  }
   const std::vector<PacsStatus> all = OrderClient(client).pacs();
   if (options.json) {
     std::cout << to_json(all) << '\n';
@@ -239,39 +290,43 @@ int pacs(Client& client, const Options& options) {
 Added order_commands() {
   const auto order_options = std::make_shared<OrderOptions>();
   const auto list_options = std::make_shared<ListOptions>();
+  const auto search_options = std::make_shared<SearchOptions>();
   Added added;
-  added.commands = {{.name = "order",
-                     .help = "Mesh a series from a PACS, send the mesh to a PACS, and wait",
-                     .examples = R"(  isomesh order archive 1.2.840.1 1.2.840.1.3 --rule ct-bone
+  added.commands = {
+      {.name = "order",
+       .help = "Mesh a series from a PACS, send the mesh to a PACS, and wait",
+       .examples = R"(  isomesh order archive 1.2.840.1 1.2.840.1.3 --rule ct-bone
   isomesh order archive 1.2.840.1 1.2.840.1.3 --parameters '{"iso": 250}' \
       --send viewer --no-wait
 )",
-                     .add_options =
-                         [order_options](CLI::App& app, Options& options) {
-                           add_order_options(app, options, *order_options);
-                         },
-                     .run =
-                         [order_options](Client& client, const Options& options) {
-                           return order(client, options, *order_options);
-                         }},
-                    {.name = "orders",
-                     .help = "List orders; show, cancel or retry one",
-                     .examples = R"(  isomesh orders --state failed
+       .add_options = [order_options](
+                          CLI::App& app,
+                          Options& options) { add_order_options(app, options, *order_options); },
+       .run = [order_options](
+                  Client& client,
+                  const Options& options) { return order(client, options, *order_options); }},
+      {.name = "orders",
+       .help = "List orders; show, cancel or retry one",
+       .examples = R"(  isomesh orders --state failed
   isomesh orders 0192e4b1-77c3 --retry
 )",
-                     .add_options =
-                         [list_options](CLI::App& app, Options& options) {
-                           add_list_options(app, options, *list_options);
-                         },
-                     .run =
-                         [list_options](Client& client, const Options& options) {
-                           return orders(client, options, *list_options);
-                         }},
-                    {.name = "pacs",
-                     .help = "List the PACS that the server knows, and their state",
-                     .examples = "  isomesh pacs\n",
-                     .add_options = [](CLI::App& /*app*/, Options& /*options*/) {},
-                     .run = pacs}};
+       .add_options = [list_options](
+                          CLI::App& app,
+                          Options& options) { add_list_options(app, options, *list_options); },
+       .run = [list_options](
+                  Client& client,
+                  const Options& options) { return orders(client, options, *list_options); }},
+      {.name = "pacs",
+       .help = "List the PACS that the server knows, or search one for series to order",
+       .examples = R"(  isomesh pacs
+  isomesh pacs main --patient-name 'Doe*' --date 20261101-20261130 --modality CT
+)",
+       .add_options = [search_options](
+                          CLI::App& app,
+                          Options& /*options*/) { add_search_options(app, *search_options); },
+       .run = [search_options](
+                  Client& client,
+                  const Options& options) { return pacs(client, options, *search_options); }}};
   added.ids = {{.operand = "ORDER", .kind = "orders", .newest = [](Client& client) {
                   OrderClient orders(client);
                   return candidates(orders, true);

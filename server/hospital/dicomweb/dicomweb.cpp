@@ -20,6 +20,10 @@ constexpr const char* kDicomJson = "application/dicom+json";
 constexpr const char* kSeriesFields =
     "includefield=00201209&includefield=00080060&includefield=0008103E";
 constexpr const char* kPatientField = "includefield=00100020";
+constexpr const char* kStudyFields =
+    "includefield=00080020&includefield=00081030&includefield=00100010&includefield=00100020";
+constexpr std::size_t kUsualStudies = 20;
+constexpr std::size_t kMostSeries = 2000;  // of a person's search
 
 FoundSeries series_of(const PeersObject& object) {
   return {.study = object.study,
@@ -27,6 +31,39 @@ FoundSeries series_of(const PeersObject& object) {
           .modality = object.modality,
           .description = object.series_description,
           .instances = object.instances};
+}
+
+// A value in which wildcards are allowed. Orthanc takes encoded characters literally, and other
+// servers reject a ^ that is not encoded, so * stands for what separates the parts of a name.
+std::string encoded_pattern(std::string_view pattern) {
+  std::string text;
+  for (const char& letter : pattern) {
+    const bool is_wildcard = letter == '*' || letter == '?';
+    text += is_wildcard                      ? std::string(1, letter)
+            : letter == '^' || letter == ' ' ? "*"
+                                             : percent_encode({&letter, 1});
+  }
+  return text;
+}
+
+// The query of a search for studies.
+std::string studies_query(const SeriesQuery& query) {
+  std::string text = '?' + std::string(kStudyFields);
+  const auto add = [&text](const char* name, const std::string& value) {
+    if (!value.empty()) text.append("&").append(name).append("=").append(value);
+  };
+  add("PatientID", encoded_pattern(query.patient_id));
+  add("PatientName", encoded_pattern(query.patient_name));
+  add("StudyDate", percent_encode(query.date));
+  add("ModalitiesInStudy", percent_encode(query.modality));
+  add("StudyInstanceUID", percent_encode(query.study));
+  return text;
+}
+
+// The reader of responses handles untrusted bytes, so its texts are checked again.
+std::string short_text(const std::string& text) {
+  constexpr std::size_t kLongest = 256;
+  return printable(beginning(text, kLongest));
 }
 
 // The multipart body of an object as one stream.
@@ -131,17 +168,23 @@ DicomWeb::DicomWeb(const orders::PacsSettings& settings, std::filesystem::path s
       most_series_bytes_(most_series_bytes),
       responses_(responses) {}
 
-SearchPage DicomWeb::fetch_page(const std::string& target, const std::stop_token& stop) {
+SearchPage DicomWeb::fetch_page(const std::string& target, const std::stop_token& stop,
+                                Until until) {
   constexpr int kBadRequest = 400;
   constexpr int kNotFound = 404;
   constexpr int kUnprocessable = 422;
   constexpr std::size_t kEnoughOfRefusal = 4096;
   const ScratchFile response(scratch_, ".response");
-  const PeerResponseHead head = peer_.send({.target = target,
-                                            .accept = kDicomJson,
-                                            .response_file = response.path(),
-                                            .most_bytes = kMostResponseBytes},
-                                           stop);
+  PeerRequest request = {.target = target,
+                         .accept = kDicomJson,
+                         .response_file = response.path(),
+                         .most_bytes = kMostResponseBytes};
+  if (until) {
+    const auto left = *until - std::chrono::steady_clock::now();
+    if (left.count() <= 0) throw PacsFailure(PacsFault::kTimeout, "the PACS takes too long");
+    request.most_time = std::chrono::ceil<std::chrono::milliseconds>(left);
+  }
+  const PeerResponseHead head = peer_.send(request, stop);
   if (head.status == kNotFound) return {.is_not_found = true};
   if (head.status == kBadRequest || head.status == kUnprocessable) {
     return {.refusal = InputFile(response.path()).text(0, kEnoughOfRefusal)};
@@ -151,8 +194,9 @@ SearchPage DicomWeb::fetch_page(const std::string& target, const std::stop_token
           .has_more = head.has_more_results};
 }
 
-SearchResults DicomWeb::search(const SearchQuery& query, const std::stop_token& stop) {
-  return search_all(query, [&](const std::string& target) { return fetch_page(target, stop); });
+SearchResults DicomWeb::search(const SearchQuery& query, const std::stop_token& stop, Until until) {
+  return search_all(query,
+                    [&](const std::string& target) { return fetch_page(target, stop, until); });
 }
 
 std::optional<PeersObject> DicomWeb::search_one(const std::string& target,
@@ -191,6 +235,61 @@ orders::RecentSeries DicomWeb::find_recent(const std::string& from_day, const st
     }
   }
   return recent;
+}
+
+PacsSeriesList DicomWeb::search(const SeriesQuery& query,
+                                std::chrono::steady_clock::time_point until,
+                                const std::stop_token& stop) {
+  const std::size_t limit = query.limit.value_or(kUsualStudies);
+  SearchQuery by = {
+      .target = "/studies" + studies_query(query), .uid = &PeersObject::study, .enough = limit + 1};
+  if (!query.study.empty()) by.only = query.study;
+  SearchResults studies = search(by, stop, until);
+  if (by.only) {
+    // A PACS may ignore the UID in the query.
+    std::erase_if(studies.objects,
+                  [&](const PeersObject& study) { return study.study != query.study; });
+  }
+  PacsSeriesList found = {.series = {},
+                          .complete = !studies.is_cut && studies.objects.size() <= limit};
+  studies.objects.resize(std::min(studies.objects.size(), limit));
+  for (const PeersObject& study : studies.objects) {
+    try {
+      add_series(found, study, stop, until);
+    } catch (const PacsFailure& failure) {
+      // After this time, a part is more useful than the failure.
+      const bool is_over = std::chrono::steady_clock::now() >= until;
+      if (!is_over || failure.fault() != PacsFault::kTimeout || found.series.empty()) throw;
+      found.complete = false;
+    }
+    if (found.series.size() >= kMostSeries || std::chrono::steady_clock::now() >= until) {
+      found.complete = found.complete && &study == &studies.objects.back();
+      break;
+    }
+  }
+  return found;
+}
+
+void DicomWeb::add_series(PacsSeriesList& found, const PeersObject& study,
+                          const std::stop_token& stop, Until until) {
+  const std::size_t room = kMostSeries - found.series.size();
+  SearchResults series = search({.target = "/studies/" + study.study + "/series?" + kSeriesFields,
+                                 .uid = &PeersObject::series,
+                                 .enough = room + 1},
+                                stop, until);
+  found.complete = found.complete && !series.is_cut && series.objects.size() <= room;
+  series.objects.resize(std::min(series.objects.size(), room));
+  for (const PeersObject& object : series.objects) {
+    found.series.push_back({.study = study.study,
+                            .series = object.series,
+                            .patient_id = short_text(study.patient_id),
+                            .patient_name = short_text(study.patient_name),
+                            .study_date = short_text(study.study_date),
+                            .study_description = short_text(study.study_description),
+                            .series_description = short_text(object.series_description),
+                            .modality = short_text(object.modality),
+                            .instances = object.instances});
+  }
 }
 
 // A PACS need not support this search (PS3.18, 10.6.1). Such a PACS returns 400, 404 or another

@@ -29,6 +29,8 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
 
   orders::RecentSeries find_recent(const std::string& from_day, const std::string& modality,
                                    const std::stop_token& stop) override;
+  PacsSeriesList search(const SeriesQuery& query, std::chrono::steady_clock::time_point until,
+                        const std::stop_token& stop) override;
   std::optional<orders::FoundSeries> find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token& stop) override;
@@ -45,8 +47,13 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:
-  SearchPage fetch_page(const std::string& target, const std::stop_token& stop);
-  SearchResults search(const SearchQuery& query, const std::stop_token& stop);
+  using Until = std::optional<std::chrono::steady_clock::time_point>;
+
+  SearchPage fetch_page(const std::string& target, const std::stop_token& stop, Until until = {});
+  SearchResults search(const SearchQuery& query, const std::stop_token& stop, Until until = {});
+  // Adds the study's series.
+  void add_series(PacsSeriesList& found, const PeersObject& study, const std::stop_token& stop,
+                  Until until);
   // Returns the object with that UID.
   std::optional<PeersObject> search_one(const std::string& target, std::string PeersObject::*name,
                                         const std::string& uid, const std::stop_token& stop);

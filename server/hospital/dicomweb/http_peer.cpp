@@ -85,6 +85,9 @@ class Exchange {
     curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
     curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME,
                      timeout + static_cast<long>(sent / kStoredPerSecond));
+    if (request_.most_time) {
+      curl_easy_setopt(easy, CURLOPT_TIMEOUT_MS, static_cast<long>(request_.most_time->count()));
+    }
     curl_easy_setopt(easy, CURLOPT_USERAGENT, "isomesh/" ISOMESH_VERSION);
     if (!settings.user.empty()) {
       curl_easy_setopt(easy, CURLOPT_HTTPAUTH, static_cast<long>(CURLAUTH_BASIC));

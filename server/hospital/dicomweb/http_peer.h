@@ -1,6 +1,7 @@
 // One HTTP request to a PACS. Does not parse the response's body.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -27,6 +28,8 @@ struct PeerRequest {
   bool is_put = false;                  // otherwise a body is sent by POST
   std::filesystem::path response_file;  // for the response's body
   std::uint64_t most_bytes = 0;         // limit of the response's body
+  // Limit of the whole exchange, more than 0; empty: it may last as long as there is progress.
+  std::optional<std::chrono::milliseconds> most_time = {};
 };
 
 struct PeerResponseHead {

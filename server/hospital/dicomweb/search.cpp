@@ -78,7 +78,10 @@ class Search {
     return known_.size() > before;
   }
 
-  bool is_found() const { return query_.only && known_.contains(*query_.only); }
+  bool is_found() const {
+    if (query_.enough && known_.size() >= *query_.enough) return true;
+    return query_.only && known_.contains(*query_.only);
+  }
 
   const SearchQuery& query_;
   const FetchPage& fetch_;

@@ -22,9 +22,10 @@ struct SearchPage {
 };
 
 struct SearchQuery {
-  std::string target;                    // with a query
-  std::string PeersObject::*uid;         // the member that identifies a result
-  std::optional<std::string> only = {};  // the search ends when this one is found
+  std::string target;                      // with a query
+  std::string PeersObject::*uid;           // the member that identifies a result
+  std::optional<std::string> only = {};    // the search ends when this one is found
+  std::optional<std::size_t> enough = {};  // the search ends when so many are found
 };
 
 struct SearchResults {

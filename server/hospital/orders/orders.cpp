@@ -79,6 +79,7 @@ Orders::Orders(const OrderServices& services, const HospitalSettings& settings,
 Orders::~Orders() { stop(); }
 
 void Orders::stop() {
+  searching_.request_stop();
   if (threads_.empty()) return;
   for (std::jthread& thread : threads_) thread.request_stop();
   {

@@ -38,6 +38,10 @@ struct OrderOptions {
   std::size_t threads = 6;
   // Simultaneous steps per PACS, so that one that hangs does not block the others.
   std::size_t per_pacs = 2;
+  // The same for searches, and for those of all PACS.
+  std::size_t searches_per_pacs = 3;
+  std::size_t searches = 6;
+  std::chrono::milliseconds longest_search{30'000};
 };
 
 // Thread safe. Its dependencies must outlive it.
@@ -79,6 +83,11 @@ class Orders {
     return services_.orders.list(viewer, filter, after, limit);
   }
 
+  // Series of a PACS, the newest studies first. Each search is entered into the audit trail. Throws
+  // Error kNotFound, kForbidden, kInvalidParameter without a part of the query that selects
+  // studies, kUnavailable if too many searches are in progress or after stop(); and PacsFailure.
+  PacsSeriesList search(const Orderer& orderer, const std::string& pacs, const SeriesQuery& query);
+
   // Tells that a job has ended; an order may wait for it.
   void job_ended(const std::string& job);
 
@@ -100,6 +109,7 @@ class Orders {
     std::stop_source stop;
   };
 
+  PacsSeriesList ask(const std::string& pacs, const SeriesQuery& query) const;
   void keep(const std::stop_token& stop);
   void pause(const std::string& reason);
   void go_on();
@@ -150,6 +160,8 @@ class Orders {
   std::map<std::string, std::string> by_job_ ISOMESH_GUARDED_BY(mutex_);  // waiting orders by job
   std::map<std::string, PacsStatus> status_ ISOMESH_GUARDED_BY(mutex_);
   std::map<std::pair<std::string, PacsFault>, std::uint64_t> failed_ ISOMESH_GUARDED_BY(mutex_);
+  std::multiset<std::string> searched_ ISOMESH_GUARDED_BY(mutex_);  // PACS, once for each search
+  std::stop_source searching_;
   std::vector<std::jthread> threads_;  // last: use all other members
 };
 

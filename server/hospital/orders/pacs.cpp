@@ -23,6 +23,8 @@ constexpr std::array kFaults = {
     FaultRow{PacsFault::kNotStored, "not-stored", ErrorCode::kPacsUnreachable},
     FaultRow{PacsFault::kChanged, "changed", ErrorCode::kSeriesIncomplete}};
 
+constexpr std::array<std::string_view, 2> kOwnModalities = {"M3D", "SR"};
+
 const FaultRow& row_of(PacsFault fault) {
   return *std::ranges::find(kFaults, fault, &FaultRow::fault);
 }
@@ -30,6 +32,10 @@ const FaultRow& row_of(PacsFault fault) {
 }  // namespace
 
 std::string_view to_string(PacsFault fault) { return row_of(fault).name; }
+
+bool is_own_modality(std::string_view modality) {
+  return std::ranges::find(kOwnModalities, modality) != kOwnModalities.end();
+}
 
 PacsFailure::PacsFailure(PacsFault fault, const std::string& detail,
                          std::chrono::seconds retry_after)

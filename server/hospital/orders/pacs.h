@@ -60,6 +60,9 @@ struct RecentSeries {
   bool is_cut = false;  // the PACS has more, but does not list them
 };
 
+// True for the modalities of our own objects, which are not images.
+bool is_own_modality(std::string_view modality);
+
 struct InstancePlace {
   std::string study;
   std::string series;
@@ -104,6 +107,12 @@ class Archive : public SeriesSource {
   // Series of studies since that day (DA), of that modality unless it is empty.
   virtual RecentSeries find_recent(const std::string& from_day, const std::string& modality,
                                    const std::stop_token& stop) = 0;
+
+  // The series of at most `query.limit` studies; what is there after `until` is cut off. A PACS may
+  // ignore parts of the query.
+  virtual PacsSeriesList search(const SeriesQuery& query,
+                                std::chrono::steady_clock::time_point until,
+                                const std::stop_token& stop) = 0;
 
   // The study's Patient ID; empty if there is no such study.
   virtual std::optional<std::string> patient_of(const std::string& study,

@@ -32,9 +32,13 @@ const PacsSettings& pacs_of(const HospitalSettings& settings, const std::string&
   return *pacs;
 }
 
+bool may_use(const PacsSettings& pacs, const Orderer& orderer) {
+  return orderer.is_administrator || pacs.owners.empty() ||
+         std::ranges::find(pacs.owners, orderer.name) != pacs.owners.end();
+}
+
 void check_owner(const PacsSettings& pacs, const Orderer& orderer) {
-  if (orderer.is_administrator || pacs.owners.empty()) return;
-  if (std::ranges::find(pacs.owners, orderer.name) != pacs.owners.end()) return;
+  if (may_use(pacs, orderer)) return;
   throw Error(ErrorCode::kForbidden, "this PACS can be used only by a rule");
 }
 
@@ -102,6 +106,23 @@ store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& o
   if (rule != nullptr) record.work.max_error_mm = rule->max_error_mm;
   if (request.callback) record.work.callback = request.callback->url;
   return record;
+}
+
+void check_searchable(const HospitalSettings& settings, const Orderer& person,
+                      const std::string& pacs) {
+  const PacsSettings* found = settings.find_pacs(pacs);
+  if (found == nullptr) {
+    throw Error(ErrorCode::kNotFound, "there is no PACS of that name: GET /v1/pacs lists them");
+  }
+  if (!may_use(*found, person)) {
+    throw Error(ErrorCode::kForbidden,
+                "this login may not search this PACS: the operator lists who may (pacs.owners)");
+  }
+  if (found->dicomweb.empty()) {
+    throw invalid_parameter("name",
+                            "is a PACS without DICOMweb, which cannot be searched: meshes are only "
+                            "sent to it. The operator can give its address (pacs.dicomweb)");
+  }
 }
 
 store::OrderRecord make_order(const Rule& rule, const std::string& pacs,

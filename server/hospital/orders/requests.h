@@ -20,6 +20,11 @@ struct Orderer {
 store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& orderer,
                               const OrderRequest& request);
 
+// Throws Error kNotFound if there is no such PACS, kInvalidParameter if it cannot be searched, and
+// kForbidden if it excludes that person.
+void check_searchable(const HospitalSettings& settings, const Orderer& person,
+                      const std::string& pacs);
+
 // Makes the order of a rule for a series that its watch has found or that was received.
 store::OrderRecord make_order(const Rule& rule, const std::string& pacs, const FoundSeries& series);
 

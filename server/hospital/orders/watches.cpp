@@ -1,6 +1,5 @@
 // Watches of rules, and the removal of old orders.
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "base/clock.h"
@@ -14,8 +13,6 @@ namespace isomesh::orders {
 namespace {
 
 constexpr std::chrono::minutes kForgetPause{10};
-// The modalities of our own objects, which are not images.
-constexpr std::array<std::string_view, 2> kOwnModalities = {"M3D", "SR"};
 
 // The day that many days ago (DA), minus one, because studies have dates without time zones.
 std::string day_before(store::Time now, std::uint32_t days) {
@@ -23,7 +20,7 @@ std::string day_before(store::Time now, std::uint32_t days) {
 }
 
 bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {
-  if (std::ranges::find(kOwnModalities, series.modality) != kOwnModalities.end()) return false;
+  if (is_own_modality(series.modality)) return false;
   if (!match.modality.empty() && series.modality != match.modality) return false;
   if (!match.series_description.empty() && !matches(match.series_description, series.description)) {
     return false;

@@ -115,6 +115,23 @@ void visit(Is<PacsStatus> auto& self, auto&& field) {
   field("reason", self.reason);
 }
 
+void visit(Is<PacsSeries> auto& self, auto&& field) {
+  field("study", self.study);
+  field("series", self.series);
+  field("patient_id", self.patient_id);
+  field("patient_name", self.patient_name);
+  field("study_date", self.study_date);
+  field("study_description", self.study_description);
+  field("series_description", self.series_description);
+  field("modality", self.modality);
+  field("instances", self.instances);
+}
+
+void visit(Is<PacsSeriesList> auto& self, auto&& field) {
+  field("series", self.series);
+  field("complete", self.complete);
+}
+
 template <>
 constexpr bool kIsRequestObject<OrderSource> = true;
 template <>
@@ -210,6 +227,8 @@ std::string to_json(const std::vector<PacsStatus>& pacs) {
   return json_values::object("pacs", pacs);
 }
 
+std::string to_json(const PacsSeriesList& found) { return json_values::to_text(found); }
+
 std::string to_callback_json(const Order& order) {
   Json json;
   json_values::write_field(json, "id", order.id);
@@ -246,6 +265,9 @@ std::vector<Order> orders_from_json(std::string_view text) {
 }
 std::vector<PacsStatus> pacs_from_json(std::string_view text) {
   return json_values::from_text<std::vector<PacsStatus>>(text, "pacs");
+}
+PacsSeriesList pacs_series_from_json(std::string_view text) {
+  return json_values::from_text<PacsSeriesList>(text);
 }
 
 std::string to_record(const OrderWork& work) { return json_values::to_text(work); }

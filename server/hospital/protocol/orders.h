@@ -170,11 +170,44 @@ struct PacsStatus {
   bool operator==(const PacsStatus&) const = default;
 };
 
+// Which series of a PACS to search for; empty members match everything.
+struct SeriesQuery {
+  std::string patient_id = {};    // * and ? are wildcards, as in the next
+  std::string patient_name = {};  // as DICOM writes it: FAMILY^GIVEN
+  std::string date = {};          // of the study: a day or a range of days as DICOM writes them
+  std::string modality = {};
+  std::string study = {};                 // UID
+  std::optional<std::size_t> limit = {};  // the most studies
+};
+
+// A series that a PACS has, as it says. Texts are empty if it does not say.
+struct PacsSeries {
+  std::string study = {};  // UIDs
+  std::string series = {};
+  std::string patient_id = {};
+  std::string patient_name = {};
+  std::string study_date = {};  // as DICOM writes it: 20261130
+  std::string study_description = {};
+  std::string series_description = {};
+  std::string modality = {};
+  std::optional<std::uint32_t> instances = {};
+
+  bool operator==(const PacsSeries&) const = default;
+};
+
+struct PacsSeriesList {
+  std::vector<PacsSeries> series;
+  bool complete = true;  // false: the PACS has more that match
+
+  bool operator==(const PacsSeriesList&) const = default;
+};
+
 std::string to_json(const Order& order);
 // {"orders": [...], "next": cursor}
 std::string to_json(const std::vector<Order>& orders, const std::string& next = "");
 // {"pacs": [...]}
 std::string to_json(const std::vector<PacsStatus>& pacs);
+std::string to_json(const PacsSeriesList& found);
 // The body of a callback: no patients, no DICOM identifiers.
 std::string to_callback_json(const Order& order);
 std::string to_json(const OrderRequest& request);
@@ -183,6 +216,7 @@ std::string to_json(const OrderRequest& request);
 Order order_from_json(std::string_view text);
 std::vector<Order> orders_from_json(std::string_view text);
 std::vector<PacsStatus> pacs_from_json(std::string_view text);
+PacsSeriesList pacs_series_from_json(std::string_view text);
 
 // For stores. Readers give missing members their defaults. They throw Error
 // kInternal.

@@ -55,6 +55,9 @@ void visit(Is<PeersObject> auto& self, auto&& field) {
   field("series", self.series);
   field("instance", self.instance);
   field("patient_id", self.patient_id);
+  field("patient_name", self.patient_name);
+  field("study_date", self.study_date);
+  field("study_description", self.study_description);
   field("modality", self.modality);
   field("series_description", self.series_description);
   field("instances", self.instances);

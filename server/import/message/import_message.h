@@ -85,6 +85,9 @@ struct PeersObject {
   std::string series = {};
   std::string instance = {};
   std::string patient_id = {};
+  std::string patient_name = {};
+  std::string study_date = {};  // DA
+  std::string study_description = {};
   std::string modality = {};
   std::string series_description = {};
   std::optional<std::uint32_t> instances = {};  // of the series

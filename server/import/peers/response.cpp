@@ -17,7 +17,9 @@ namespace {
 
 namespace json = json_values;
 
+constexpr const char* kStudyDate = "00080020";
 constexpr const char* kModality = "00080060";
+constexpr const char* kStudyDescription = "00081030";
 constexpr const char* kSeriesDescription = "0008103E";
 constexpr const char* kReferencedSeriesSequence = "00081115";
 constexpr const char* kReferencedSopInstanceUid = "00081155";
@@ -25,6 +27,7 @@ constexpr const char* kFailureReason = "00081197";
 constexpr const char* kFailedSopSequence = "00081198";
 constexpr const char* kReferencedSopSequence = "00081199";
 constexpr const char* kSopInstanceUid = "00080018";
+constexpr const char* kPatientName = "00100010";
 constexpr const char* kPatientId = "00100020";
 constexpr const char* kStudyInstanceUid = "0020000D";
 constexpr const char* kSeriesInstanceUid = "0020000E";
@@ -59,12 +62,23 @@ const Json* tag_value(const Json& object, const char* tag) {
   return &json::element(*values, 0);
 }
 
-std::string tag_text(const Json& object, const char* tag) {
+std::string shown(const Json* value) {
   constexpr std::size_t kLongest = 1024;
-  const Json* value = tag_value(object, tag);
   if (value == nullptr || !json::is_string(*value)) return "";
   // Spaces around a value are not significant. The same values of images are read without them.
-  return printable(dicom::without_padding(json::text(*value)).substr(0, kLongest));
+  return printable(beginning(dicom::without_padding(json::text(*value)), kLongest));
+}
+
+std::string tag_text(const Json& object, const char* tag) { return shown(tag_value(object, tag)); }
+
+// The first way of writing a name that has one (PS3.18, F.2.2). Some servers write only a string.
+std::string name_of(const Json& object, const char* tag) {
+  const Json* const value = tag_value(object, tag);
+  if (value == nullptr || !json::is_object(*value)) return shown(value);
+  for (const char* group : {"Alphabetic", "Ideographic", "Phonetic"}) {
+    if (std::string name = shown(json::find(*value, group)); !name.empty()) return name;
+  }
+  return "";
 }
 
 std::string uid_of(const Json& object, const char* tag) {
@@ -124,6 +138,9 @@ PeersObject described_object(const Json& object) {
           .series = uid_of(object, kSeriesInstanceUid),
           .instance = uid_of(object, kSopInstanceUid),
           .patient_id = tag_text(object, kPatientId),
+          .patient_name = name_of(object, kPatientName),
+          .study_date = tag_text(object, kStudyDate),
+          .study_description = tag_text(object, kStudyDescription),
           .modality = tag_text(object, kModality),
           .series_description = tag_text(object, kSeriesDescription),
           .instances = tag_number<std::uint32_t>(object, kNumberOfSeriesRelatedInstances)};

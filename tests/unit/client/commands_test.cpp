@@ -68,6 +68,16 @@ class Commands : public testing::Test {
     options_.outputs = {{.path = folder_ / "head.drc", .format = MeshFormat::kDrc}};
   }
 
+  // The commands keep their options, so each run has commands of its own.
+  Outcome outcome_of_added(const std::string& name, const std::vector<std::string>& words) const {
+    const Added added = order_commands();
+    std::vector<const char*> arguments = {"isomesh", name.c_str()};
+    for (const std::string& word : words) arguments.push_back(word.c_str());
+    Options options = parse_options(static_cast<int>(arguments.size()), arguments.data(), added);
+    options.server = options_.server;
+    return outcome_of(options);
+  }
+
   Job job_ = test::finished_job("7", "mesh");
   std::string mesh_ = "mesh";
   std::function<void()> at_a_look_;  // runs when the job is asked for
@@ -158,6 +168,88 @@ TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {
             "8 failed: no\uFFFD[2J\n"
             "  ordered today from main\uFFFD[2J, study 1.2\uFFFD[2J, rule bones\uFFFD[2J\n");
   EXPECT_EQ(told["pacs"], "main  last success never  last failure today (no\uFFFD[2J)\n");
+}
+
+TEST_F(Commands, OrdersListsShowsCancelsAndRetries) {
+  Order order;
+  order.id = "8";
+  order.created = "today";
+  order.source.pacs = "main";
+  order.source.study = "1.2";
+  order.next_attempt = "soon";
+  std::vector<std::string> asked;
+  server_.http.Get("/v1/orders", [&](const auto& request, auto& response) {
+    asked.push_back(request.target);
+    response.set_content(to_json(std::vector{order}, "more"), "application/json");
+  });
+  const auto one = [&](const auto& request, auto& response) {
+    asked.push_back(request.method + ' ' + request.path);
+    response.set_content(to_json(order), "application/json");
+  };
+  server_.http.Get("/v1/orders/8", one);
+  server_.http.Delete("/v1/orders/8", one);
+  server_.http.Post("/v1/orders/8/retry", one);
+  const auto run_with = [&](const std::vector<std::string>& words) {
+    return outcome_of_added("orders", words);
+  };
+  const std::string shown =
+      "8 waiting\n  ordered today from main, study 1.2\n  next attempt soon\n";
+  const Outcome list = run_with({"--state", "waiting", "--rule", "bone", "--cursor", "c"});
+  EXPECT_EQ(list.out, shown);
+  EXPECT_EQ(list.err, "More: isomesh orders --cursor more\n");
+  EXPECT_EQ(run_with({"8"}).out, shown);
+  EXPECT_EQ(run_with({"8", "--cancel", "--json"}).out, to_json(order) + '\n');
+  EXPECT_EQ(run_with({"8", "--retry"}).out, shown);
+  EXPECT_THAT(asked, testing::IsSupersetOf({"/v1/orders?state=waiting&rule=bone&cursor=c",
+                                            "GET /v1/orders/8", "DELETE /v1/orders/8",
+                                            "POST /v1/orders/8/retry"}));
+}
+
+TEST_F(Commands, ReportPrintsOrWritesWhatTheServerTells) {
+  server_.http.Get("/v1/jobs/7/report", test::answering(R"({"job": "7"})"));
+  Options options = test::options_from({"report", "7"});
+  options.server = options_.server;
+  EXPECT_EQ(outcome_of(options).out, "{\"job\": \"7\"}\n");
+  options.report = folder_ / "report.json";
+  EXPECT_EQ(outcome_of(options).out, "");
+  EXPECT_EQ(test::read_file(options.report), "{\"job\": \"7\"}\n");
+}
+
+TEST_F(Commands, PacsSearchesOneForSeries) {
+  httplib::Params asked;
+  PacsSeriesList found = {.series = {{.study = "1.2",
+                                      .series = "1.3",
+                                      .patient_id = "PAT-1",
+                                      .patient_name = "Doe^Jane\x1b[2J",
+                                      .study_date = "20261130",
+                                      .study_description = "Head",
+                                      .series_description = "bone",
+                                      .modality = "CT",
+                                      .instances = 54},
+                                     {.study = "1.2", .series = "1.4"}},
+                          .complete = false};
+  server_.http.Get("/v1/pacs/main/series", [&](const auto& request, auto& response) {
+    asked = request.params;
+    response.set_content(to_json(found), "application/json");
+  });
+  const auto run_with = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "main");
+    return outcome_of_added("pacs", words);
+  };
+  const Outcome table = run_with({"--patient-name", "Doe*", "--modality", "CT", "--limit", "7"});
+  EXPECT_EQ(table.status, kDone);
+  EXPECT_EQ(table.out,
+            "  DATE      ID     PATIENT       MODALITY  IMAGES  STUDY  SERIES  UIDS\n"
+            "  20261130  PAT-1  Doe^Jane\uFFFD[2J  CT            54  Head   bone    1.2 1.3\n"
+            "                                                ?                 1.2 1.4\n");
+  EXPECT_THAT(table.err, HasSubstr("The PACS has more"));
+  EXPECT_EQ(asked, (httplib::Params{{"patient_name", "Doe*"}, {"modality", "CT"}, {"limit", "7"}}));
+  EXPECT_EQ(run_with({"--study", "1.2", "--json"}).out, to_json(found) + '\n');
+  found = {};
+  const Outcome none = run_with({"--date", "20261130"});
+  EXPECT_EQ(none.out, "");
+  EXPECT_EQ(none.err, "The PACS has no such series\n");
+  EXPECT_EQ(test::end_of({"pacs", "--study", "1.2"}).first, kWrongUsage);
 }
 
 TEST_F(Commands, QuietSaysNothing) {

@@ -153,6 +153,13 @@ class FakePacs : public Archive, public ObjectReceiver {
     const Lock lock(mutex_);
     return !is_unlisted && stored_.contains(place.instance);
   }
+  PacsSeriesList search(const SeriesQuery& query, std::chrono::steady_clock::time_point,
+                        const std::stop_token& stop) override {
+    answer(stop);
+    const Lock lock(mutex_);
+    asked_ = query;
+    return searchable_;
+  }
   std::string segmented_series(const std::string&, const std::string&,
                                const std::stop_token& stop) override {
     answer(stop);
@@ -170,6 +177,16 @@ class FakePacs : public Archive, public ObjectReceiver {
   void hold(const std::vector<std::string>& files) {
     const Lock lock(mutex_);
     held_ = files;
+  }
+
+  // A search finds this, whatever is asked.
+  void find(const PacsSeriesList& found) {
+    const Lock lock(mutex_);
+    searchable_ = found;
+  }
+  SeriesQuery asked() {
+    const Lock lock(mutex_);
+    return asked_;
   }
 
  private:
@@ -202,6 +219,8 @@ class FakePacs : public Archive, public ObjectReceiver {
   Mutex mutex_;
   std::set<std::string> stored_ ISOMESH_GUARDED_BY(mutex_);
   std::vector<std::string> held_ ISOMESH_GUARDED_BY(mutex_);
+  PacsSeriesList searchable_ ISOMESH_GUARDED_BY(mutex_);
+  SeriesQuery asked_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 // Tells until when nothing was due, and lets the test act before a change.
@@ -329,7 +348,9 @@ class OrdersTest : public test::JobsFixture {
                                        OrderOptions{.now = [this] { return now(); },
                                                     .keep_orders = [this] { return keep(); },
                                                     .cut_off = [this] { store_.release(); },
-                                                    .threads = 3});
+                                                    .threads = 3,
+                                                    .searches_per_pacs = 1,
+                                                    .searches = 2});
     orders_->on_end([](const std::string&) {});
   }
 

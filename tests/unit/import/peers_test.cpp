@@ -120,6 +120,8 @@ TEST(Answer, OfASearchIsAListOfObjects) {
     {"0020000D": {"vr": "UI", "Value": ["1.2"]}, "0020000E": {"vr": "UI", "Value": ["1.3"]},
      "00080018": {"vr": "UI", "Value": ["1.4"]}, "00100020": {"vr": "LO", "Value": ["P"]},
      "00080060": {"vr": "CS", "Value": ["CT"]}, "0008103E": {"vr": "LO", "Value": ["head"]},
+     "00080020": {"vr": "DA", "Value": ["20261130"]}, "00081030": {"vr": "LO", "Value": ["neuro"]},
+     "00100010": {"vr": "PN", "Value": [{"Alphabetic": "", "Ideographic": " 名^前 "}]},
      "00201209": {"vr": "IS", "Value": [54]}},
     {"00201209": {"vr": "IS", "Value": ["54"]}}, {"00201209": {"vr": "IS"}}, {}])");
   ASSERT_EQ(answer.objects.size(), 4U);
@@ -127,12 +129,19 @@ TEST(Answer, OfASearchIsAListOfObjects) {
                                             .series = "1.3",
                                             .instance = "1.4",
                                             .patient_id = "P",
+                                            .patient_name = "名^前",
+                                            .study_date = "20261130",
+                                            .study_description = "neuro",
                                             .modality = "CT",
                                             .series_description = "head",
                                             .instances = 54}));
   EXPECT_EQ(answer.objects[1].instances, 54U);
   EXPECT_FALSE(answer.objects[2].instances);
   EXPECT_EQ(answer.objects[3], PeersObject());
+  // A long text is cut between characters.
+  const auto cut =
+      answer_of(R"([{"0008103E": {"Value": ["x)" + std::string(1022, 'x') + R"(名"]}}])");
+  EXPECT_EQ(cut.objects.at(0).series_description, std::string(1023, 'x'));
   EXPECT_THAT(answer_of("").objects, IsEmpty());
   EXPECT_THAT(answer_of("[]").objects, IsEmpty());
 }

@@ -12,9 +12,29 @@ let pacs: Server;
 let folder: string;
 let hospital: Daemon;
 let status = 503;
+const searched: URLSearchParams[] = [];
+
+// Two series of one study, if it answers at all.
+function found(path: string): unknown[] {
+  const told = (vr: string, value: unknown): unknown => ({ vr, Value: [value] });
+  if (/\/studies$/.test(path)) {
+    const name = { Alphabetic: 'Doe^<b>Jane</b>' };
+    return [{ '0020000D': told('UI', '1.2.7'), '00080020': told('DA', '20261130'), '00100010': told('PN', name), '00100020': told('LO', 'PAT-1'), '00081030': told('LO', 'Head') }];
+  }
+  return ['scout', 'bone 1 mm'].map((text, number) => ({
+    '0020000E': told('UI', `1.2.7.${number}`),
+    '00080060': told('CS', 'CT'),
+    '0008103E': told('LO', text),
+    '00201209': told('IS', 54 + number),
+  }));
+}
 
 beforeAll(async () => {
-  pacs = createServer((_, answer) => answer.writeHead(status, { 'Content-Type': 'application/json' }).end('[]'));
+  pacs = createServer(({ url = '' }, answer) => {
+    const { pathname, searchParams } = new URL(url, 'http://pacs');
+    if (/\/studies$/.test(pathname)) searched.push(searchParams);
+    answer.writeHead(status, { 'Content-Type': 'application/json' }).end(JSON.stringify(status === 200 ? found(pathname) : []));
+  });
   await new Promise<void>((resolve) => pacs.listen(0, '127.0.0.1', resolve));
   folder = mkdtempSync(join(tmpdir(), 'isomesh-hospital-'));
   const file = join(folder, 'hospital.toml');
@@ -77,6 +97,34 @@ describe('orders', () => {
     await expect.poll(() => page.locator('.queue-body').innerText()).toContain('No orders are failed');
     await page.getByLabel('State').selectOption('waiting');
     await expect.poll(() => other.innerText()).toContain('next attempt');
+    await page.close();
+    expect(faults).toEqual([]);
+  });
+
+  it('are placed for a series that a search of the PACS finds', async () => {
+    const { page, faults } = await openPage(at.browser, hospital.url);
+    await page.goto(`${hospital.url}/#/orders`);
+    await page.getByText('New order').click();
+    await page.getByRole('button', { name: 'Search' }).click();
+    await expect.poll(() => page.getByRole('alert').innerText()).toContain('a search needs one of patient_id');
+    status = 503;
+    await page.getByLabel('Patient name').fill('doe, j');
+    await page.getByLabel('From').fill('2026-11-01');
+    await page.getByLabel('Modality').fill('ct');
+    await page.keyboard.press('Enter');
+    await expect.poll(() => page.getByRole('alert').innerText()).toContain('503');
+    status = 200;
+    await page.keyboard.press('Enter');
+    const rows = page.locator('tr[data-series]');
+    await expect.poll(() => rows.count()).toBe(2);
+    expect(await rows.nth(1).locator('td').allInnerTexts()).toEqual(['Doe <b>Jane</b> PAT-1', '2026-11-30', 'Head, bone 1 mm', 'CT', '55', 'Choose']);
+    expect(['PatientName', 'StudyDate', 'ModalitiesInStudy', 'PatientID'].map((name) => searched.at(-1)?.get(name))).toEqual(['doe*j*', '20261101-', 'CT', null]);
+    status = 503; // the order waits
+    await page.getByRole('button', { name: /^Choose .*bone 1 mm/ }).press('Enter');
+    expect(await rows.nth(1).getAttribute('aria-current')).toBe('true');
+    await page.keyboard.type('bone'); // into the rule
+    await page.keyboard.press('Enter');
+    await expect.poll(() => page.locator('tr[data-order]', { hasText: '1.2.7.1' }).innerText()).toMatch(/waiting[^]*bone/);
     await page.close();
     expect(faults).toEqual([]);
   });

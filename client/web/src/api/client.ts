@@ -24,6 +24,7 @@ import type {
   OrderList,
   OrderState,
   PacsList,
+  PacsSeriesList,
   Uploaded,
   UploadOptions,
   Volume,
@@ -257,6 +258,15 @@ export class Client {
   /** Each PACS of the server, and when it last answered. */
   listPacs(signal?: GlobalAbortSignal): Promise<PacsList> {
     return this.connection.json('/v1/pacs', { signal });
+  }
+
+  /** Searches a PACS for series, the newest first. One of patient, name, date and study is needed; dates are as DICOM writes them. */
+  searchPacs(
+    pacs: string,
+    query: { patient_id?: string; patient_name?: string; date?: string; modality?: string; study?: string; limit?: number },
+    signal?: GlobalAbortSignal,
+  ): Promise<PacsSeriesList> {
+    return this.connection.json(`/v1/pacs/${encodeURIComponent(pacs)}/series${queryOf(query)}`, { signal });
   }
 
   /** Lists the newest first, in pages. An empty state lists all. */

@@ -50,6 +50,8 @@ export type Order = Omit<Schemas['Order'], 'parameters'> & { parameters: Partial
 export type OrderList = Omit<Schemas['OrderList'], 'orders'> & { orders: Order[] };
 export type OrderState = Schemas['OrderState'];
 export type PacsList = Schemas['PacsList'];
+export type PacsSeries = Schemas['PacsSeries'];
+export type PacsSeriesList = Schemas['PacsSeriesList'];
 
 export type MeshSummary = Schemas['MeshSummary'];
 export type LabelSummary = Schemas['LabelSummary'];

@@ -54,3 +54,15 @@ export function saidOf(order: Order, now: number): Said {
   const count = attempts === 1 ? '1 attempt failed' : `${formatCount(attempts)} attempts failed`;
   return { text: `${error.detail}; ${count}`, isBad: true, next: next === null ? '' : `next attempt ${untilText(next, now)}` };
 }
+
+// The beginning of a name is enough, and blanks stand for what separates its parts in DICOM.
+export function nameAsked(text: string): string {
+  const name = text.trim().replace(/[\s^,]+/g, '*');
+  return name === '' || /[*?]$/.test(name) ? name : `${name}*`;
+}
+
+// As DICOM writes a day or a range of days.
+export function daysAsked(from: string, to: string): string {
+  const [first, last] = [from, to].map((day) => day.replaceAll('-', ''));
+  return first === last ? (first ?? '') : `${first}-${last}`;
+}

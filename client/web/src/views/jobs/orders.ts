@@ -1,14 +1,14 @@
 // A hospital's orders: what waits and why, what failed, and how the PACS are. #/orders
 import { client } from '../../client';
-import { asApiError } from '../../api/problem';
 import { isFinal, type Order, type OrderList, type OrderState, type PacsList } from '../../api/types';
 import { surfaceInWords } from '../../job/parameters';
 import { button, field, h, select } from '../../ui/dom';
 import { formatTime, shortId } from '../../ui/format';
-import { refusal, tellError } from '../../ui/notices';
+import { tellError } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { cell, keepFocus, row, table } from '../../ui/table';
+import { OrderPlacing } from './order_placing';
 import { orderStates, saidOf } from './order_texts';
 
 const refreshEvery = 2000;
@@ -42,7 +42,7 @@ class Orders {
   private readonly pacs = h('ul.pacs', { 'aria-label': 'PACS' });
   private readonly body = h('div.queue-body', { tabindex: '0', role: 'region', 'aria-label': 'Orders' });
   private readonly more = button('Older orders', () => this.showMore(), { hidden: true });
-  private readonly source = h('select');
+  private readonly placing = new OrderPlacing(() => this.refresh());
   private orders: Order[] = [];
   private pages = 1; // that are shown
   private next: string | null = null;
@@ -61,34 +61,10 @@ class Orders {
     this.element = h('div.queue.orders', [
       h('div.section-head', h('h1', 'Orders'), h('span.grow'), field('State', choice)),
       this.pacs,
-      this.placing(),
+      this.placing.element,
       this.body,
       h('div.actions', this.more),
     ]);
-  }
-
-  // The server cannot search a PACS, so the series is named as the PACS shows it.
-  private placing(): HTMLElement {
-    const input = (name: string, attributes: Record<string, string | boolean> = {}): HTMLInputElement => h('input', { type: 'text', name, autocomplete: 'off', ...attributes });
-    const uid = { required: true, pattern: '[0-9.]{1,64}', title: 'A UID of digits and dots' };
-    const [study, series, rule] = [input('study', uid), input('series', uid), input('rule')];
-    const problem = h('div');
-    const form = h('form.job-filter', [
-      field('PACS', this.source),
-      field('Study Instance UID', study),
-      field('Series Instance UID', series),
-      field('Rule', rule),
-      h('button.primary', { type: 'submit' }, 'Place the order'),
-    ]);
-    form.addEventListener('submit', (event) => {
-      event.preventDefault();
-      problem.replaceChildren();
-      client.placeOrder({ pacs: this.source.value, study: study.value, series: series.value }, rule.value || undefined).then(() => {
-        series.value = '';
-        return this.refresh();
-      }).catch((error: unknown) => problem.replaceChildren(refusal(asApiError(error))));
-    });
-    return h('details.more', h('summary', 'New order'), form, problem);
   }
 
   async refresh(): Promise<void> {
@@ -99,8 +75,7 @@ class Orders {
     this.orders = shown.orders;
     this.next = shown.next;
     this.pacs.replaceChildren(...pacs.map(pacsItem));
-    // A choice stays while it is made.
-    if (this.source.length === 0) this.source.append(...pacs.map(({ name }) => h('option', name)));
+    this.placing.offer(pacs.map(({ name }) => name));
     this.show();
   }
 
