@@ -186,9 +186,10 @@ http::MeasuredFamily orders_of(const store::OrderCounts& counts) {
 }
 
 http::MeasuredFamily failures_of(const std::vector<orders::Attempts>& failed) {
-  http::MeasuredFamily family{.name = "isomesh_order_attempts_failed_total",
-                              .help = "Failed attempts of orders, by PACS and reason",
-                              .is_counter = true};
+  http::MeasuredFamily family{
+      .name = "isomesh_order_attempts_failed_total",
+      .help = "Failed attempts of orders, watches and searches, by PACS and reason",
+      .is_counter = true};
   for (const orders::Attempts& attempts : failed) {
     family.values.push_back(
         {{{"pacs", attempts.pacs}, {"reason", std::string(orders::to_string(attempts.fault))}},

@@ -146,8 +146,8 @@ bool is_range_of_days(std::string_view text) {
   if (dash == text.npos) return is_day(text);
   const std::string_view first = text.substr(0, dash);
   const std::string_view last = text.substr(dash + 1);
-  return (first.empty() || is_day(first)) && (last.empty() || is_day(last)) &&
-         !(first.empty() && last.empty());
+  if (first.empty() || last.empty()) return is_day(first) || is_day(last);
+  return is_day(first) && is_day(last) && first <= last;
 }
 
 bool is_modality(std::string_view text) {
@@ -160,17 +160,17 @@ bool is_modality(std::string_view text) {
 
 SeriesQuery series_query_of(const Request& request) {
   constexpr WholeNumbers kStudies = {1, 100};
-  constexpr std::uint64_t kUsualStudies = 20;
-  const SeriesQuery query = {.patient_id = short_text_of(request, "patient_id"),
-                             .patient_name = short_text_of(request, "patient_name"),
-                             .date = short_text_of(request, "date"),
-                             .modality = short_text_of(request, "modality"),
-                             .study = short_text_of(request, "study"),
-                             .limit = whole_number_of(request, "limit", kStudies, kUsualStudies)};
+  const SeriesQuery query = {
+      .patient_id = short_text_of(request, "patient_id"),
+      .patient_name = short_text_of(request, "patient_name"),
+      .date = short_text_of(request, "date"),
+      .modality = short_text_of(request, "modality"),
+      .study = short_text_of(request, "study"),
+      .limit = whole_number_of(request, "limit", kStudies, SeriesQuery().limit)};
   if (!query.date.empty() && !is_range_of_days(query.date)) {
     throw invalid_parameter("date",
-                            "must be a day such as 20261130, or days such as 20261101-20261130, "
-                            "20261101- and -20261130");
+                            "must be a day such as 20261130, or days in their order such as "
+                            "20261101-20261130, 20261101- and -20261130");
   }
   if (!is_modality(query.modality)) {
     throw invalid_parameter("modality", "must be one such as CT, in capital letters");

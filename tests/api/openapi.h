@@ -33,7 +33,7 @@ class HospitalFile {
 
  private:
   TemporaryFolder folder_;
-  const Receiver pacs_{{404}};
+  const Receiver pacs_{{204}};
 };
 
 class OpenApiTest : public testing::Test {

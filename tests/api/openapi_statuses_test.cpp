@@ -269,8 +269,9 @@ void probe_orders(Statuses& statuses, const Order& order, const std::string& bod
   statuses.probe("GET /v1/orders", "/v1/orders?state=x");
   statuses.probe("GET /v1/pacs", "/v1/pacs");
   statuses.probe("GET /v1/pacs", "/v1/pacs?x=1");
-  for (const std::string query : {"empty/series?study=1.2", "unknown/series?study=1.2",
-                                  "absent/series", "absent/series?date=20261130-"}) {
+  for (const std::string query :
+       {"empty/series?study=1.2", "unknown/series?study=1.2", "absent/series",
+        "absent/series?date=20261130-", "absent/series?date=20261130-20261101"}) {
     statuses.probe("GET /v1/pacs/{name}/series", "/v1/pacs/" + query);
   }
   const std::string one = "/v1/orders/" + order.id;

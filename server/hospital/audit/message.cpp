@@ -130,7 +130,8 @@ Content content_of(const Json& entry, const std::string& code, const AuditSource
   const std::string owner = text_of(entry, "owner");
   const std::string asked = owner.empty() ? "" : participant(owner, true, nullptr);
   if (code == "110112") {
-    const std::string query = "study " + text_of(entry, "study");
+    const std::string search = text_of(entry, "query");
+    const std::string query = search.empty() ? "study " + text_of(entry, "study") : search;
     return {participant(source.station, owner.empty(), &kSource) +
                 participant(peer, false, &kDestination) + asked,
             object(kStudyRootFind, "2", "3", kSopClassUid,

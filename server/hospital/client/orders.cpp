@@ -85,7 +85,7 @@ PacsSeriesList OrderClient::search(const std::string& pacs, const SeriesQuery& q
   add("date", query.date);
   add("modality", query.modality);
   add("study", query.study);
-  add("limit", query.limit ? std::to_string(*query.limit) : "");
+  add("limit", std::to_string(query.limit));
   return pacs_series_from_json(client_.ask(request));
 }
 

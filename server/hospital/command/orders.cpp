@@ -253,14 +253,16 @@ int search(OrderClient& client, const Options& options, const SearchOptions& ask
                     each.instances ? std::to_string(*each.instances) : "?", each.study_description,
                     each.series_description, each.study + ' ' + each.series});
   }
-  if (found.series.empty()) {
-    std::cerr << "The PACS has no such series\n";
-  } else {
+  if (!found.series.empty()) {
     std::vector<Align> columns(rows.front().size(), Align::kLeft);
     columns[4] = Align::kRight;
     std::cout << in_columns(columns, std::move(rows));
   }
-  if (!found.complete) std::cerr << "The PACS has more: search for less, or use --limit\n";
+  if (!found.complete) {
+    std::cerr << "The PACS has more studies than were listed: narrow the search\n";
+  } else if (found.series.empty()) {
+    std::cerr << "The PACS has no such series\n";
+  }
   return kDone;
 }
 

@@ -22,8 +22,9 @@ constexpr const char* kSeriesFields =
 constexpr const char* kPatientField = "includefield=00100020";
 constexpr const char* kStudyFields =
     "includefield=00080020&includefield=00081030&includefield=00100010&includefield=00100020";
-constexpr std::size_t kUsualStudies = 20;
-constexpr std::size_t kMostSeries = 2000;  // of a person's search
+// Limits of a person's search.
+constexpr std::size_t kMostStudies = 1000;
+constexpr std::size_t kMostSeries = 2000;
 
 FoundSeries series_of(const PeersObject& object) {
   return {.study = object.study,
@@ -34,16 +35,20 @@ FoundSeries series_of(const PeersObject& object) {
 }
 
 // A value in which wildcards are allowed. Orthanc takes encoded characters literally, and other
-// servers reject a ^ that is not encoded, so * stands for what separates the parts of a name.
+// servers reject those that are not encoded, so * stands for them if anything else is left.
 std::string encoded_pattern(std::string_view pattern) {
   std::string text;
+  bool is_wild = true;
   for (const char& letter : pattern) {
-    const bool is_wildcard = letter == '*' || letter == '?';
-    text += is_wildcard                      ? std::string(1, letter)
-            : letter == '^' || letter == ' ' ? "*"
-                                             : percent_encode({&letter, 1});
+    const bool is_kept = percent_encode({&letter, 1}).size() == 1;
+    is_wild = is_wild && !is_kept;
+    if (is_kept || letter == '?') {
+      text += letter;
+    } else if (!text.ends_with('*')) {
+      text += '*';
+    }
   }
-  return text;
+  return is_wild ? percent_encode(pattern) : text;
 }
 
 // The query of a search for studies.
@@ -64,6 +69,15 @@ std::string studies_query(const SeriesQuery& query) {
 std::string short_text(const std::string& text) {
   constexpr std::size_t kLongest = 256;
   return printable(beginning(text, kLongest));
+}
+
+// What a study says of each of its series.
+PacsSeries study_of(const PeersObject& study) {
+  return {.study = study.study,
+          .patient_id = short_text(study.patient_id),
+          .patient_name = short_text(study.patient_name),
+          .study_date = short_text(study.study_date),
+          .study_description = short_text(study.study_description)};
 }
 
 // The multipart body of an object as one stream.
@@ -240,22 +254,30 @@ orders::RecentSeries DicomWeb::find_recent(const std::string& from_day, const st
 PacsSeriesList DicomWeb::search(const SeriesQuery& query,
                                 std::chrono::steady_clock::time_point until,
                                 const std::stop_token& stop) {
-  const std::size_t limit = query.limit.value_or(kUsualStudies);
-  SearchQuery by = {
-      .target = "/studies" + studies_query(query), .uid = &PeersObject::study, .enough = limit + 1};
-  if (!query.study.empty()) by.only = query.study;
-  SearchResults studies = search(by, stop, until);
-  if (by.only) {
-    // A PACS may ignore the UID in the query.
-    std::erase_if(studies.objects,
-                  [&](const PeersObject& study) { return study.study != query.study; });
+  SearchQuery by = {.target = "/studies" + studies_query(query), .uid = &PeersObject::study};
+  if (query.study.empty()) {
+    by.enough = kMostStudies;
+  } else {
+    by.only = query.study;
   }
+  const SearchResults all = search(by, stop, until);
+  if (all.is_not_found) {
+    throw PacsFailure(PacsFault::kRefused,
+                      "the PACS returned status 404 for /studies: its address may be wrong");
+  }
+  std::vector<PacsSeries> studies;
+  for (const PeersObject& study : all.objects) {
+    studies.push_back(study_of(study));
+    if (!orders::is_asked_for(studies.back(), query)) studies.pop_back();
+  }
+  std::ranges::stable_sort(studies, std::ranges::greater(), &PacsSeries::study_date);
   PacsSeriesList found = {.series = {},
-                          .complete = !studies.is_cut && studies.objects.size() <= limit};
-  studies.objects.resize(std::min(studies.objects.size(), limit));
-  for (const PeersObject& study : studies.objects) {
+                          .complete = !all.is_cut && all.objects.size() < kMostStudies &&
+                                      studies.size() <= query.limit};
+  studies.resize(std::min(studies.size(), query.limit));
+  for (const PacsSeries& study : studies) {
     try {
-      add_series(found, study, stop, until);
+      add_series(found, study, query, stop, until);
     } catch (const PacsFailure& failure) {
       // After this time, a part is more useful than the failure.
       const bool is_over = std::chrono::steady_clock::now() >= until;
@@ -263,14 +285,14 @@ PacsSeriesList DicomWeb::search(const SeriesQuery& query,
       found.complete = false;
     }
     if (found.series.size() >= kMostSeries || std::chrono::steady_clock::now() >= until) {
-      found.complete = found.complete && &study == &studies.objects.back();
+      found.complete = found.complete && &study == &studies.back();
       break;
     }
   }
   return found;
 }
 
-void DicomWeb::add_series(PacsSeriesList& found, const PeersObject& study,
+void DicomWeb::add_series(PacsSeriesList& found, const PacsSeries& study, const SeriesQuery& query,
                           const std::stop_token& stop, Until until) {
   const std::size_t room = kMostSeries - found.series.size();
   SearchResults series = search({.target = "/studies/" + study.study + "/series?" + kSeriesFields,
@@ -280,15 +302,12 @@ void DicomWeb::add_series(PacsSeriesList& found, const PeersObject& study,
   found.complete = found.complete && !series.is_cut && series.objects.size() <= room;
   series.objects.resize(std::min(series.objects.size(), room));
   for (const PeersObject& object : series.objects) {
-    found.series.push_back({.study = study.study,
-                            .series = object.series,
-                            .patient_id = short_text(study.patient_id),
-                            .patient_name = short_text(study.patient_name),
-                            .study_date = short_text(study.study_date),
-                            .study_description = short_text(study.study_description),
-                            .series_description = short_text(object.series_description),
-                            .modality = short_text(object.modality),
-                            .instances = object.instances});
+    PacsSeries each = study;
+    each.series = object.series;
+    each.series_description = short_text(object.series_description);
+    each.modality = short_text(object.modality);
+    each.instances = object.instances;
+    if (orders::is_asked_for(each, query)) found.series.push_back(std::move(each));
   }
 }
 

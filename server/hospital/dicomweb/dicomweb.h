@@ -51,9 +51,9 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
 
   SearchPage fetch_page(const std::string& target, const std::stop_token& stop, Until until = {});
   SearchResults search(const SearchQuery& query, const std::stop_token& stop, Until until = {});
-  // Adds the study's series.
-  void add_series(PacsSeriesList& found, const PeersObject& study, const std::stop_token& stop,
-                  Until until);
+  // Adds those of the study's series that are asked for.
+  void add_series(PacsSeriesList& found, const PacsSeries& study, const SeriesQuery& query,
+                  const std::stop_token& stop, Until until);
   // Returns the object with that UID.
   std::optional<PeersObject> search_one(const std::string& target, std::string PeersObject::*name,
                                         const std::string& uid, const std::stop_token& stop);

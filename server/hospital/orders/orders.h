@@ -38,7 +38,7 @@ struct OrderOptions {
   std::size_t threads = 6;
   // Simultaneous steps per PACS, so that one that hangs does not block the others.
   std::size_t per_pacs = 2;
-  // The same for searches, and for those of all PACS.
+  // Simultaneous searches per PACS, and in total.
   std::size_t searches_per_pacs = 3;
   std::size_t searches = 6;
   std::chrono::milliseconds longest_search{30'000};
@@ -109,7 +109,7 @@ class Orders {
     std::stop_source stop;
   };
 
-  PacsSeriesList ask(const std::string& pacs, const SeriesQuery& query) const;
+  PacsSeriesList ask(const std::string& pacs, const SeriesQuery& query);
   void keep(const std::stop_token& stop);
   void pause(const std::string& reason);
   void go_on();

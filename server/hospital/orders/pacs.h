@@ -63,6 +63,10 @@ struct RecentSeries {
 // True for the modalities of our own objects, which are not images.
 bool is_own_modality(std::string_view modality);
 
+// False for those that a PACS tells although the query excludes them, as it ignores what it does
+// not support, and for our own objects. Only the PACS knows how it compares names.
+bool is_asked_for(const PacsSeries& series, const SeriesQuery& query);
+
 struct InstancePlace {
   std::string study;
   std::string series;
@@ -108,8 +112,8 @@ class Archive : public SeriesSource {
   virtual RecentSeries find_recent(const std::string& from_day, const std::string& modality,
                                    const std::stop_token& stop) = 0;
 
-  // The series of at most `query.limit` studies; what is there after `until` is cut off. A PACS may
-  // ignore parts of the query.
+  // The series that are asked for, of at most `query.limit` studies, the newest first. Results
+  // after `until` are dropped.
   virtual PacsSeriesList search(const SeriesQuery& query,
                                 std::chrono::steady_clock::time_point until,
                                 const std::stop_token& stop) = 0;

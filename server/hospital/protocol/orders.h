@@ -176,8 +176,8 @@ struct SeriesQuery {
   std::string patient_name = {};  // as DICOM writes it: FAMILY^GIVEN
   std::string date = {};          // of the study: a day or a range of days as DICOM writes them
   std::string modality = {};
-  std::string study = {};                 // UID
-  std::optional<std::size_t> limit = {};  // the most studies
+  std::string study = {};  // UID
+  std::size_t limit = 20;  // the most studies
 };
 
 // A series that a PACS has, as it says. Texts are empty if it does not say.

@@ -49,10 +49,10 @@ std::string audit_record(const AuditEntry& entry) {
        {std::pair{"order", &entry.order}, std::pair{"owner", &entry.owner},
         std::pair{"pacs", &entry.peer_name}, std::pair{"direction", &entry.direction},
         std::pair{"study", &entry.study}, std::pair{"patient_id", &entry.patient_id},
-        std::pair{"peer", &entry.peer}, std::pair{"called", &entry.called},
-        std::pair{"calling", &entry.calling}, std::pair{"caller", &entry.caller},
-        std::pair{"what", &entry.what}, std::pair{"volume", &entry.volume},
-        std::pair{"job", &entry.job}}) {
+        std::pair{"query", &entry.query}, std::pair{"peer", &entry.peer},
+        std::pair{"called", &entry.called}, std::pair{"calling", &entry.calling},
+        std::pair{"caller", &entry.caller}, std::pair{"what", &entry.what},
+        std::pair{"volume", &entry.volume}, std::pair{"job", &entry.job}}) {
     if (!text->empty()) put(name, *text);
   }
   const auto count = [&](const char* name, std::uint64_t number) {

@@ -33,6 +33,7 @@ struct AuditEntry {
   std::string study = {};
   std::uint64_t instances = 0;
   std::string patient_id = {};
+  std::string query = {};  // of a search; empty: for the study
   // The address of a peer that began an association, and the titles that it sent.
   std::string peer = {};
   std::string called = {};

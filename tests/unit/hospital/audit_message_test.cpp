@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/base64.h"
 #include "server/hospital/audit/message.h"
 #include "tests/support/errors.h"
 
@@ -47,6 +48,18 @@ TEST(AuditMessage, SaysWhoHadWhatOfWhom) {
   // The schema's order.
   EXPECT_LT(xml.find("<ActiveParticipant"), xml.find("<AuditSourceIdentification"));
   EXPECT_LT(xml.find("<AuditSourceIdentification"), xml.find("<ParticipantObjectIdentification"));
+}
+
+TEST(AuditMessage, OfASearchHasItsQuery) {
+  const std::string query = "PatientName=Doe*";
+  const std::string xml = audit_message(
+      R"({"id":7,"at":"2026-11-20T10:00:00.123Z","event":"110112","outcome":"success",)"
+      R"("owner":"radio","pacs":"main","query":")" +
+          query + "\"}",
+      kSource);
+  EXPECT_TRUE(is_xml(xml)) << xml;
+  EXPECT_THAT(xml, HasSubstr("<ParticipantObjectQuery>" + to_base64(query) + '<'));
+  EXPECT_THAT(xml, HasSubstr("UserID=\"radio\" UserIsRequestor=\"true\""));
 }
 
 TEST(AuditMessage, ComingInIsTheOtherWayRound) {

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,17 +19,21 @@ using std::chrono::steady_clock;
 using testing::ElementsAre;
 using testing::SizeIs;
 
-// Three studies, of which the second one has two series.
+// Three studies, of which the second one has two series. Ignores the query, but not the page.
 class TellingPacs {
  public:
   TellingPacs() {
     http_.Get("/studies", [this](const httplib::Request& request, httplib::Response& response) {
       asked_ = request.params;
-      response.set_content(study("1.1", "\"Roe^Rita\"") + ',' +
-                               study("1.2", R"({"Ideographic": "名^前", "Phonetic": "x"})") + ',' +
-                               study("1.3", R"({"Alphabetic": "Doe^Jane"})") + ']',
-                           "application/dicom+json");
-      response.body.insert(0, "[");
+      if (studies.empty()) {
+        response.status = 404;
+        return;
+      }
+      std::string page;
+      const std::size_t offset = std::stoul(asked("offset"));
+      const std::size_t end = std::min(studies.size(), offset + std::stoul(asked("limit")));
+      for (std::size_t i = offset; i < end; ++i) page += (page.empty() ? "" : ",") + studies[i];
+      response.set_content('[' + page + ']', "application/dicom+json");
     });
     http_.Get("/studies/(.*)/series",
               [](const httplib::Request& request, httplib::Response& response) {
@@ -55,12 +61,19 @@ class TellingPacs {
     return found == asked_.end() ? "" : found->second;
   }
 
- private:
-  static std::string study(const std::string& uid, const std::string& name) {
+  static std::string study(const std::string& uid, const std::string& name,
+                           const std::string& day = "20261130") {
     return R"({"0020000D": {"vr": "UI", "Value": [")" + uid +
-           R"("]}, "00080020": {"vr": "DA", "Value": ["20261130"]}, "00100020": {"vr": "LO", "Value": ["P"]}, "00081030": {"vr": "LO", "Value": ["Head"]}, "00100010": {"vr": "PN", "Value": [)" +
+           R"("]}, "00080020": {"vr": "DA", "Value": [")" + day +
+           R"("]}, "00100020": {"vr": "LO", "Value": ["P"]}, "00081030": {"vr": "LO", "Value": ["Head"]}, "00100010": {"vr": "PN", "Value": [)" +
            name + "]}}";
   }
+
+  std::vector<std::string> studies = {study("1.1", "\"Roe^Rita\""),
+                                      study("1.2", R"({"Ideographic": "名^前", "Phonetic": "x"})"),
+                                      study("1.3", R"({"Alphabetic": "Doe^Jane"})")};
+
+ private:
   static std::string one_series(const std::string& uid, const std::string& description) {
     return R"({"0020000E": {"vr": "UI", "Value": [")" + uid +
            R"("]}, "00201209": {"vr": "IS", "Value": [7]}, "0008103E": {"vr": "LO", "Value": [")" +
@@ -96,7 +109,7 @@ TEST(SearchOfAPerson, FindsStudiesAndThenTheirSeries) {
   EXPECT_EQ(all.series[1].patient_name, "名^前");
   EXPECT_EQ(all.series[2].series_description, std::string(256, 'a'));
   EXPECT_EQ(all.series[3].patient_name, "Doe^Jane");
-  EXPECT_EQ(pacs.asked("PatientName"), "D*e*J&=");
+  EXPECT_EQ(pacs.asked("PatientName"), "D*e*J*");
   EXPECT_EQ(pacs.asked("StudyDate"), "20261101-20261130");
   EXPECT_EQ(pacs.asked("ModalitiesInStudy"), "CT");
   EXPECT_EQ(pacs.asked("PatientID"), "");
@@ -111,6 +124,41 @@ TEST(SearchOfAPerson, FindsStudiesAndThenTheirSeries) {
   EXPECT_EQ(test::code_thrown_by([&] { web.search({.study = "1.3"}, steady_clock::now(), {}); }),
             ErrorCode::kPacsUnreachable)
       << "out of time";
+  search({.patient_id = "A/12", .patient_name = "名^前"});
+  EXPECT_EQ(pacs.asked("PatientID"), "A*12");
+  EXPECT_EQ(pacs.asked("PatientName"), "名^前") << "wildcards alone would find everybody";
+}
+
+TEST(SearchOfAPerson, ListsTheNewestOfManyStudiesAndTheOneThatWasAskedFor) {
+  TellingPacs pacs;
+  pacs.studies.clear();
+  for (int n = 0; n < 150; ++n) {
+    pacs.studies.push_back(
+        TellingPacs::study("2." + std::to_string(n), "\"Roe\"", std::to_string(20260000 + n)));
+  }
+  jobs::ImportRunner runner({.bounds = {}, .program = ISOMESH_IMPORT});
+  const test::TemporaryFolder folder;
+  DicomWeb web(pacs.settings(), folder.path(), 1 << 20, runner);
+  const auto search = [&](const SeriesQuery& query) {
+    return web.search(query, steady_clock::now() + std::chrono::minutes(1), {});
+  };
+  const PacsSeriesList newest = search({.patient_id = "P", .limit = 2});
+  EXPECT_FALSE(newest.complete);
+  ASSERT_THAT(newest.series, SizeIs(2));
+  EXPECT_EQ(newest.series[0].study, "2.149");
+  EXPECT_EQ(newest.series[1].study, "2.148");
+  const PacsSeriesList day = search({.date = "20260007", .limit = 1});
+  EXPECT_TRUE(day.complete) << "the others are not asked for";
+  ASSERT_THAT(day.series, SizeIs(1));
+  EXPECT_EQ(day.series[0].study, "2.7");
+  const PacsSeriesList one = search({.study = "2.140"});
+  EXPECT_TRUE(one.complete);
+  ASSERT_THAT(one.series, SizeIs(1));
+  EXPECT_EQ(one.series[0].study, "2.140");
+  pacs.studies.clear();
+  const Error error = test::error_of([&] { search({.study = "2.140"}); });
+  EXPECT_EQ(error.code(), ErrorCode::kPacsRefused);
+  EXPECT_THAT(error.what(), testing::HasSubstr("404"));
 }
 
 // The program misbehaves as the response says.

@@ -50,8 +50,8 @@ class SearchesTest : public OrdersTest {
   const SeriesQuery patient_ = {.patient_id = "PAT-*", .date = "20261101-", .modality = "CT"};
 };
 
-TEST_F(SearchesTest, TellTheNewestFirstAndAreInTheTrail) {
-  main_->find({.series = {series_of("1.2.5", "20261128"), series_of("1.2.6")}, .complete = false});
+TEST_F(SearchesTest, AreInTheTrail) {
+  main_->find({.series = {series_of("1.2.6"), series_of("1.2.5", "20261128")}, .complete = false});
   const PacsSeriesList found = search(patient_);
   EXPECT_FALSE(found.complete);
   EXPECT_THAT(found.series, ElementsAre(series_of("1.2.6"), series_of("1.2.5", "20261128")));
@@ -60,11 +60,13 @@ TEST_F(SearchesTest, TellTheNewestFirstAndAreInTheTrail) {
   ASSERT_THAT(entries, SizeIs(1));
   EXPECT_EQ(entries[0].at("owner"), "student");
   EXPECT_EQ(entries[0].at("pacs"), "main");
+  EXPECT_EQ(entries[0].at("query"), "PatientID=PAT-*&StudyDate=20261101-&ModalitiesInStudy=CT");
   EXPECT_EQ(entries[0].at("outcome"), "success");
   EXPECT_TRUE(orders_->pacs().at(0).last_success);
 }
 
-TEST_F(SearchesTest, LeaveOutWhatWasNotAskedForThoughThePacsTellsIt) {
+TEST(SeriesOfASearch, AreThoseThatWereAskedFor) {
+  const SeriesQuery patient = {.patient_id = "PAT-*", .date = "20261101-", .modality = "CT"};
   PacsSeries other = series_of("1.2.5");
   other.patient_id = "X";
   PacsSeries ours = series_of("1.2.6");
@@ -72,19 +74,24 @@ TEST_F(SearchesTest, LeaveOutWhatWasNotAskedForThoughThePacsTellsIt) {
   PacsSeries scout = series_of("1.2.7");
   scout.modality = "MR";
   PacsSeries silent = {.study = kStudy, .series = "1.2.8"};
-  main_->find({.series = {other, ours, scout, series_of("1.2.9", "20261031"), silent}});
-  EXPECT_THAT(search(patient_).series, ElementsAre(silent));
-  EXPECT_THAT(search({.patient_name = "Doe", .date = "-20261031"}).series,
-              ElementsAre(series_of("1.2.9", "20261031"), silent));
+  const PacsSeries october = series_of("1.2.9", "20261031");
+  for (const PacsSeries& each : {other, ours, scout, october}) {
+    EXPECT_FALSE(is_asked_for(each, patient)) << each.series;
+  }
+  EXPECT_TRUE(is_asked_for(series_of("1.2.5"), patient));
+  EXPECT_TRUE(is_asked_for(silent, patient)) << "the PACS tells nothing of it";
+  EXPECT_TRUE(is_asked_for(october, {.patient_name = "Roe", .date = "-20261031"}));
+  EXPECT_FALSE(is_asked_for(october, {.study = "1.2"}));
 }
 
 TEST_F(SearchesTest, NeedSomethingThatSelectsStudies) {
   for (const SeriesQuery& query :
        {SeriesQuery(), SeriesQuery{.modality = "CT"}, SeriesQuery{.patient_name = "*"},
-        SeriesQuery{.patient_id = "?*", .patient_name = "**"}}) {
+        SeriesQuery{.patient_id = "?*", .patient_name = "**"},
+        SeriesQuery{.patient_name = "^ ^"}}) {
     const Error error = test::error_of([&] { search(query); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
-    EXPECT_THAT(error.what(), HasSubstr("patient_id, patient_name, date and study"));
+    EXPECT_THAT(error.what(), HasSubstr("a patient's ID or name, a date or a study"));
   }
   EXPECT_THAT(queries(), IsEmpty());
   EXPECT_EQ(main_->calls, 0);

@@ -106,7 +106,7 @@ describe('orders', () => {
     await page.goto(`${hospital.url}/#/orders`);
     await page.getByText('New order').click();
     await page.getByRole('button', { name: 'Search' }).click();
-    await expect.poll(() => page.getByRole('alert').innerText()).toContain('a search needs one of patient_id');
+    await expect.poll(() => page.getByRole('alert').innerText()).toContain('a search needs a patient');
     status = 503;
     await page.getByLabel('Patient name').fill('doe, j');
     await page.getByLabel('From').fill('2026-11-01');
@@ -117,7 +117,8 @@ describe('orders', () => {
     await page.keyboard.press('Enter');
     const rows = page.locator('tr[data-series]');
     await expect.poll(() => rows.count()).toBe(2);
-    expect(await rows.nth(1).locator('td').allInnerTexts()).toEqual(['Doe <b>Jane</b> PAT-1', '2026-11-30', 'Head, bone 1 mm', 'CT', '55', 'Choose']);
+    expect(await page.locator('details.more [role=status]').innerText()).toBe('2 series.');
+    expect(await rows.nth(1).locator('td').allInnerTexts()).toEqual(['Doe <b>Jane</b> PAT-1', '2026-11-30', 'Head, bone 1 mm', 'CT', '55 images', 'Choose']);
     expect(['PatientName', 'StudyDate', 'ModalitiesInStudy', 'PatientID'].map((name) => searched.at(-1)?.get(name))).toEqual(['doe*j*', '20261101-', 'CT', null]);
     status = 503; // the order waits
     await page.getByRole('button', { name: /^Choose .*bone 1 mm/ }).press('Enter');

@@ -5,6 +5,7 @@ import type { PacsSeries, PacsSeriesList } from '../../api/types';
 import { button, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
+import type { Scope } from '../../ui/signal';
 import { cell, row, table } from '../../ui/table';
 import { dateOf } from '../../volume/names';
 import { daysAsked, nameAsked } from './order_texts';
@@ -18,9 +19,9 @@ function input(name: string, attributes: Record<string, string | boolean> = {}):
 
 export class OrderPlacing {
   readonly element: HTMLElement;
-  private readonly pacs = h('select', { onChange: () => this.show() });
+  private readonly pacs = h('select', { onChange: () => this.forget() });
   private readonly patientId = input('patient_id');
-  private readonly patientName = input('patient_name', { title: 'Its beginning is enough; * stands for any text' });
+  private readonly patientName = input('patient_name', { title: 'The beginning of the name is enough; * stands for any text' });
   private readonly from = h('input', { type: 'date', name: 'from' });
   private readonly to = h('input', { type: 'date', name: 'to' });
   private readonly modality = input('modality', { size: '6', title: 'Such as CT or MR' });
@@ -28,11 +29,15 @@ export class OrderPlacing {
   private readonly study = input('study', { ...uid, required: true });
   private readonly series = input('series', { ...uid, required: true });
   private readonly rule = input('rule');
-  private readonly found = h('div.found-series', { 'aria-live': 'polite' });
+  private readonly state = h('p.hint', { role: 'status' });
+  private readonly found = h('div.found-series');
   private readonly problem = h('div');
-  private searches = 0;
+  private searching = new AbortController();
 
-  constructor(private readonly onPlaced: () => Promise<void>) {
+  constructor(
+    scope: Scope,
+    private readonly onPlaced: () => Promise<void>,
+  ) {
     const search = h('form.job-filter', { onSubmit: (event: Event) => this.search(event), 'aria-label': 'Search the PACS' }, [
       field('PACS', this.pacs),
       field('Patient ID', this.patientId),
@@ -49,7 +54,8 @@ export class OrderPlacing {
       field('Rule', this.rule),
       h('button.primary', { type: 'submit' }, 'Place the order'),
     ]);
-    this.element = h('details.more', h('summary', 'New order'), search, this.found, order, this.problem);
+    scope.signal.addEventListener('abort', () => this.searching.abort());
+    this.element = h('details.more', h('summary', 'New order'), search, this.state, this.found, order, this.problem);
   }
 
   // A choice stays while it is made.
@@ -59,8 +65,8 @@ export class OrderPlacing {
 
   private search(event: Event): void {
     event.preventDefault();
-    const number = this.searches + 1;
-    this.show(h('p.hint', 'Searching...'));
+    this.show('Searching...');
+    const { signal } = this.searching;
     const query = {
       patient_id: this.patientId.value.trim(),
       patient_name: nameAsked(this.patientName.value),
@@ -68,32 +74,39 @@ export class OrderPlacing {
       modality: this.modality.value.trim().toUpperCase(),
       study: this.searchedStudy.value.trim(),
     };
-    client.searchPacs(this.pacs.value, query).then(
-      (list) => this.showIfLast(number, this.listOf(list)),
-      (error: unknown) => this.showIfLast(number, [refusal(asApiError(error))]),
+    client.searchPacs(this.pacs.value, query, signal).then(
+      (list) => this.list(list),
+      (error: unknown) => signal.aborted || this.show('', refusal(asApiError(error))),
     );
   }
 
-  private showIfLast(number: number, shown: HTMLElement[]): void {
-    if (number === this.searches) this.show(...shown);
-  }
-
-  // What an earlier search still finds is of no use any more.
-  private show(...shown: HTMLElement[]): void {
-    this.searches += 1;
+  // Ends the search in progress, whose results would be those of another question.
+  private show(state: string, ...shown: HTMLElement[]): void {
+    this.searching.abort();
+    this.searching = new AbortController();
+    this.state.textContent = state;
     this.found.replaceChildren(...shown);
   }
 
-  private listOf({ series, complete }: PacsSeriesList): HTMLElement[] {
-    if (series.length === 0 && complete) return [h('p.empty', 'The PACS has no such series.')];
-    const more = complete ? [] : [h('p.attention', 'The PACS has more: search for less.')];
-    return [...more, table(columns, ['Action'], series.map((each) => this.row(each)))];
+  private list({ series, complete }: PacsSeriesList): void {
+    const count = series.length === 1 ? '1 series' : `${formatCount(series.length)} series`;
+    const none = complete ? 'The PACS has no such series.' : 'No such series in the studies that were listed.';
+    const more = complete ? '' : ' The PACS has more studies: narrow the search.';
+    const rows = table(columns, ['Action'], series.map((each) => this.row(each)));
+    rows.setAttribute('aria-label', 'Series found');
+    this.show((series.length > 0 ? `${count}.` : none) + more, ...(series.length > 0 ? [rows] : []));
+  }
+
+  // UIDs of one PACS mean nothing to another.
+  private forget(): void {
+    this.show('');
+    this.study.value = this.series.value = '';
   }
 
   private row(each: PacsSeries): HTMLElement {
     const name = each.patient_name.replaceAll('^', ' ').trim();
     const description = [each.study_description, each.series_description].filter(Boolean).join(', ');
-    const images = each.instances === null ? '?' : formatCount(each.instances);
+    const images = each.instances === null ? '' : `${formatCount(each.instances)} ${each.instances === 1 ? 'image' : 'images'}`;
     const label = `Choose ${[name || each.patient_id, dateOf(each.study_date), description, each.modality].filter(Boolean).join(', ')}`;
     const choice: HTMLElement = row(
       { 'data-series': each.series },
@@ -108,11 +121,15 @@ export class OrderPlacing {
   }
 
   private choose({ study, series }: PacsSeries, chosen: HTMLElement): void {
-    for (const each of this.found.querySelectorAll('tr[aria-current]')) each.removeAttribute('aria-current');
+    this.unmark();
     chosen.setAttribute('aria-current', 'true');
     this.study.value = study;
     this.series.value = series;
     this.rule.focus();
+  }
+
+  private unmark(): void {
+    for (const each of this.found.querySelectorAll('tr[aria-current]')) each.removeAttribute('aria-current');
   }
 
   private place(event: Event): void {
@@ -122,6 +139,7 @@ export class OrderPlacing {
       .placeOrder({ pacs: this.pacs.value, study: this.study.value, series: this.series.value }, this.rule.value || undefined)
       .then(() => {
         this.series.value = '';
+        this.unmark();
         return this.onPlaced();
       })
       .catch((error: unknown) => this.problem.replaceChildren(refusal(asApiError(error))));

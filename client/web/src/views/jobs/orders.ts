@@ -42,7 +42,7 @@ class Orders {
   private readonly pacs = h('ul.pacs', { 'aria-label': 'PACS' });
   private readonly body = h('div.queue-body', { tabindex: '0', role: 'region', 'aria-label': 'Orders' });
   private readonly more = button('Older orders', () => this.showMore(), { hidden: true });
-  private readonly placing = new OrderPlacing(() => this.refresh());
+  private readonly placing: OrderPlacing;
   private orders: Order[] = [];
   private pages = 1; // that are shown
   private next: string | null = null;
@@ -58,6 +58,7 @@ class Orders {
       noteInAddress({ state: chosen });
       this.refresh().catch(tellError);
     });
+    this.placing = new OrderPlacing(scope, () => this.refresh());
     this.element = h('div.queue.orders', [
       h('div.section-head', h('h1', 'Orders'), h('span.grow'), field('State', choice)),
       this.pacs,
