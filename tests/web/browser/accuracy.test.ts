@@ -193,7 +193,10 @@ describe('a surface that is not what was meant', () => {
     await expect.poll(orange).toBe(0);
     const make = page.getByRole('button', { name: 'Make what is shown' });
     expect(await make.isDisabled()).toBe(true);
+    await rows.last().getByRole('checkbox').uncheck();
     await rows.first().getByRole('checkbox').uncheck();
+    await expect.poll(() => page.locator('.components').innerText()).toContain('0 of 2 are shown');
+    await rows.last().getByRole('checkbox').check();
     await make.click();
     await expect.poll(() => page.url()).not.toContain(id);
     const { mesh } = await madeJob(at);

@@ -16,9 +16,12 @@ describe('a surface', () => {
     await page.locator('.panel-head').getByRole('button', { name: 'Erase' }).click();
     await page.getByRole('dialog').getByRole('button', { name: 'Cancel' }).click();
     expect(await statusOf(daemon.url, `/v1/jobs/${first.id}`)).toBe(200);
+    const places = await page.evaluate(() => history.length);
     await page.locator('.panel-head').getByRole('button', { name: 'Erase' }).click();
     await agree.click();
     await page.waitForURL(/#\/jobs$/);
+    // Back does not lead to what is gone.
+    expect(await page.evaluate(() => history.length)).toBe(places);
     expect(await statusOf(daemon.url, `/v1/jobs/${first.id}`)).toBe(404);
     const row = page.locator(`[data-job="${second.id}"]`);
     await row.getByRole('button', { name: /^Erase/ }).click();

@@ -77,10 +77,10 @@ describe('a surface', () => {
       }, pixels);
     };
     await expect.poll(red).toBeGreaterThan(40);
-    await bad.getByRole('button', { name: 'Make it without smoothing' }).click();
+    await bad.getByRole('button', { name: 'Untangle them' }).click();
     await expect.poll(() => page.url()).not.toContain(id);
     await surfaceLoaded(page);
-    await madeJob(at);
+    expect((await madeJob(at)).parameters).toMatchObject({ passes: 60, untangle: true });
     await expect.poll(() => page.locator('.print-check').innerText()).toMatch(/No triangle crosses another one/);
   });
 

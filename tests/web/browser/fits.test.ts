@@ -14,6 +14,7 @@ const views = new Map<string, string>();
 // Parts that come later than their view.
 const late = new Map([
   ['a volume', ['.estimate:not(.stale) dl', '.made ul']],
+  ['a volume in many formats', ['.estimate:not(.stale) dl']],
   ['a volume of labels', ['.estimate:not(.stale) dl', '.label-choice .labels li', '.made ul']],
   ['a surface with slices', ['[data-plane=sagittal]']],
 ]);
@@ -27,6 +28,7 @@ beforeAll(async () => {
   const labels = await daemon.make({ volume: segmented, labels: 'all', formats: ['glb'] });
   views.set('volumes', '');
   views.set('a volume', `volumes/${volume}`);
+  views.set('a volume in many formats', `volumes/${volume}?iso=100&formats=glb,drc,stl,3mf,ply,obj,vtk,vtp,gii`);
   views.set('a volume of labels', `volumes/${segmented}`);
   views.set('jobs', 'jobs');
   views.set('a surface', `jobs/${id}`);
@@ -58,6 +60,16 @@ function excess(page: Page): Promise<{ down: number; right: number; header: numb
     return { down: root.scrollHeight - window.innerHeight, right: root.scrollWidth - window.innerWidth, header };
   });
 }
+
+describe('the estimate', () => {
+  it('is as tall as its texts in a panel that scrolls', async ({ page }) => {
+    await page.setViewportSize({ width: 1440, height: 600 });
+    await open(page, 'a volume in many formats');
+    const { own, texts } = await page.locator('.estimate').evaluate((box) => ({ own: box.clientHeight, texts: box.scrollHeight }));
+    expect(own).toBeGreaterThan(110);
+    expect(own).toBe(texts);
+  });
+});
 
 describe.each(Object.entries(sizes))('on %s', (_, size) => {
   it('no view is taller or wider than the window', async ({ page }) => {

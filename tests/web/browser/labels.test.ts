@@ -59,8 +59,9 @@ describe('the labels of a surface', () => {
     const file = await saving;
     expect(file.suggestedFilename()).toMatch(/-labels\.csv$/);
     const lines = readFileSync(await file.path()).toString().trim().split('\r\n');
-    expect(lines).toHaveLength(2);
-    expect(lines[1]).toMatch(/^5,label 5,#[0-9a-f]{6},\d+,/);
+    // All of them, whatever is searched for.
+    expect(lines).toHaveLength(4);
+    expect(lines[3]).toMatch(/^5,label 5,#[0-9a-f]{6},\d+,/);
   });
 });
 
@@ -355,9 +356,16 @@ describe('the surfaces of labels', () => {
     expect(one.name).toMatch(/-2\.[a-z]+$/);
     const label = made.mesh?.labels?.find(({ label: number }) => number === 2);
     expect(one.text.slice(0, 200)).toMatch(new RegExp(`^(OFF)\\s+\\d+ ${label?.triangles}\\b`));
+    // One that is shown alone has its walls to the others, too.
+    await page.getByRole('button', { name: 'Show only Left half' }).click();
+    const again = await saved(() => page.getByLabel('Save what is shown as').selectOption('OFF'));
+    expect(again.name).toMatch(/-2\.off$/);
+    expect(again.text).toBe(one.text);
+    await page.getByRole('button', { name: 'Show all' }).click();
     await page.getByRole('checkbox', { name: 'Show Left half' }).uncheck();
     const shown = await saved(() => page.getByLabel('Save what is shown as').selectOption('OBJ'));
     expect(shown.name).toMatch(/2-labels\.obj$/);
+    expect(await page.locator('.toasts').textContent()).toContain('OBJ of 2 labels without the others');
     expect((shown.text.match(/^o .*$/gm) ?? []).length).toBe(2);
     expect(page.url().split('?')[0]).toBe(address.split('?')[0]);
   });

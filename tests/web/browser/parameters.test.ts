@@ -99,6 +99,7 @@ describe('the kind of a surface', () => {
     await expect.poll(() => noted(page, 'passes')).toBe('0');
     await kind('For printing').check({ force: true });
     await expect.poll(() => kind('For printing').isChecked()).toBe(true);
+    await expect.poll(() => page.locator('.estimate dd').first().innerText()).toMatch(/^\d.* before simplification$/);
     const job = await make(page);
     expect(job).toMatchObject({ close: true, certify: true, passes: 5 });
     expect(job['formats']).toEqual(expect.arrayContaining(['glb', 'stl', '3mf']));

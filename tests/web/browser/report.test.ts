@@ -8,8 +8,9 @@ const { it, alone } = setup();
 describe('a report', () => {
   it('has pictures, numbers, the proof, versions and hashes on a sheet, and as JSON', async (at) => {
     const { page, daemon } = at;
-    const volume = await daemon.upload(ballNrrd(24, 8));
-    const job = await daemon.make({ volume, iso: 100, formats: ['glb', 'stl'], certify: true });
+    const scan = await daemon.upload(ballNrrd(24, 8));
+    const { id: volume } = await daemon.json<{ id: string }>(`/v1/volumes/${scan}/reoriented?axes=-x,y,z`, { method: 'POST' });
+    const job = await daemon.make({ volume, iso: 100, formats: ['glb', 'stl', '3mf'], certify: true });
     await openSurface(at, job.id);
     await page.getByRole('button', { name: 'Report' }).click();
     await page.waitForURL(/#\/jobs\/[^/]+\/report/);
@@ -20,12 +21,19 @@ describe('a report', () => {
     const text = await sheet.innerText();
     for (const { sha256 } of Object.values(job.mesh?.files ?? {})) expect(text).toContain(sha256);
     expect(text).toMatch(/Volume[^]*mm\u00b3[^]*Connected components[^]*Distance from the scan[^]*Parameters/);
+    expect(text).toMatch(/Notes[^]*-x,y,z[^]*Made\s+\d+ \w+ 20\d\d[^]*Before you print[^]*Closed: it has an inside/);
+    expect(await sheet.locator('.print-check button').count()).toBe(0);
     expect(text).toContain((await daemon.json<{ version: string }>('/version')).version);
     const [saved] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name: 'Save as JSON' }).click()]);
     const told = JSON.parse(readFileSync(await saved.path(), 'utf8')) as { job: { id: string }; volume: { id: string } };
     expect([told.job.id, told.volume.id]).toEqual([job.id, volume]);
     await page.emulateMedia({ media: 'print' });
     expect(await page.locator('header.top').isVisible()).toBe(false);
+    // Without pictures it is told where they are, but not on paper.
+    await page.reload();
+    const hint = sheet.getByText('Choose Report beside the surface');
+    await hint.waitFor({ state: 'attached' });
+    expect(await hint.isVisible()).toBe(false);
   });
 });
 
@@ -54,6 +62,14 @@ describe('the list of jobs', () => {
     await page.getByLabel('To', { exact: true }).fill('');
     await expect.poll(() => rows.count()).toBe(5);
     for (const at of [0, 2]) await rows.nth(at).getByRole('checkbox').check();
+    // A search hides them from being erased, too.
+    await page.getByRole('searchbox').fill('iso 91');
+    const erase = page.locator('.section-head button.danger');
+    await expect.poll(() => erase.isDisabled()).toBe(true);
+    await page.getByRole('button', { name: 'Choose all' }).click();
+    await expect.poll(() => erase.innerText()).toBe('Erase (1)');
+    await page.getByRole('button', { name: 'Choose all' }).click();
+    await page.getByRole('searchbox').fill('');
     await page.getByRole('button', { name: 'Erase (2)' }).click();
     await page.getByRole('dialog').getByRole('button', { name: 'Erase' }).click();
     await expect.poll(() => rows.count()).toBe(3);

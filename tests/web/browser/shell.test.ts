@@ -130,19 +130,21 @@ describe('a surface', () => {
     expect(label).toBeGreaterThan(600);
     // Twice as fine as the screen, and nothing is behind the surface.
     const view = await page.locator('.viewport').boundingBox();
-    const { width, height, corner, black } = await pixels.evaluate((picture) => {
+    const { width, height, corner, black, scale } = await pixels.evaluate((picture) => {
       const { data } = picture;
       let dark = 0;
-      // The scale bar is the only dark thing in the lower right corner.
-      for (let x = picture.width - 100; x < picture.width; x += 1) {
-        const at = 4 * ((picture.height - 32) * picture.width + x);
+      // The scale bar is the only dark thing in the lower right corner. It grows with the picture.
+      const scale = Math.min(picture.width, 2 * picture.height) / 450;
+      for (let x = picture.width - Math.round(50 * scale); x < picture.width; x += 1) {
+        const at = 4 * ((picture.height - Math.round(16 * scale)) * picture.width + x);
         if (data[at] === 0x11 && data[at + 3] === 255) dark += 1;
       }
-      return { width: picture.width, height: picture.height, corner: data[3], black: dark };
+      return { width: picture.width, height: picture.height, corner: data[3], black: dark, scale };
     });
     expect([width, height]).toEqual([2 * Math.floor(view?.width ?? 0), 2 * Math.floor(view?.height ?? 0)]);
     expect(corner).toBe(0);
-    expect(black).toBeGreaterThan(50);
+    expect(scale).toBeGreaterThan(2.5);
+    expect(black).toBeGreaterThan(25 * scale);
   });
 });
 

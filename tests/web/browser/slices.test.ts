@@ -317,11 +317,11 @@ describe('slices before there is a mesh', () => {
     await canvas.click({ position: { x: box.width / 2 + 10 * scale, y: box.height / 2 } });
     await expect.poll(() => canvas.getAttribute('aria-label')).toMatch(/, (19\.[5-9]|20(\.[0-5])?) mm(, \d+ to \d+)?$/);
     expect(noted(page, 'at')).toBe(place);
-    // The length stands on its ground, 8 pixels from the point, and not over the point.
+    // The length stands on its ground, 8 pixels from the point and below it.
     const coloured = (from: number, to: number): Promise<number> =>
       canvas.evaluate(
         (one: HTMLCanvasElement, [left, right, middle]) => {
-          const { data = [] } = one.getContext('2d', { willReadFrequently: true })?.getImageData(left, middle - 6, right - left, 4) ?? {};
+          const { data = [] } = one.getContext('2d', { willReadFrequently: true })?.getImageData(left, middle + 14, right - left, 4) ?? {};
           let count = 0;
           for (let i = 0; i < data.length; i += 4) if ((data[i] ?? 0) > (data[i + 2] ?? 0) + 60) count += 1;
           return count;
@@ -330,6 +330,10 @@ describe('slices before there is a mesh', () => {
       );
     await expect.poll(() => coloured(8, 60)).toBeGreaterThan(10);
     expect(await coloured(-40, 6)).toBe(0);
+    // A drag is no window while a person measures.
+    const before = noted(page, 'window');
+    await drag(page, [box.x + box.width / 2 - 60, box.y + box.height / 2 - 60], [box.x + box.width / 2 - 20, box.y + box.height / 2 - 60]);
+    expect(await settled(page, () => noted(page, 'window'))).toBe(before);
     // Keys that are pressed in a dialog are the dialog's.
     await page.keyboard.press('?');
     const dialog = page.locator('dialog.help');

@@ -175,7 +175,7 @@ describe('an upload of several volumes', () => {
     await page.goto(daemon.url);
     const jane = { patient: 'Doe^Jane', uid: '1.5.1', title: 'Head' };
     const joe = { patient: 'Doe^Joe', uid: '1.5.2', title: 'Knee' };
-    const series = [['thin', '1.6.1', jane], ['knee', '1.6.2', joe], ['thick', '1.6.3', jane]] as const;
+    const series = [['knee', '1.6.1', joe], ['thin', '1.6.2', jane], ['thick', '1.6.3', jane]] as const;
     const slices = series.flatMap(([name, uid, study], n) =>
       [1, 2].map((index) => ({ name: `${name}${index}.dcm`, bytes: ctSlice(10 * n + index, `1.9.${n}`, name, uid, study) })),
     );
@@ -183,7 +183,8 @@ describe('an upload of several volumes', () => {
     const groups = page.locator('.choice-group');
     await expect.poll(() => groups.count()).toBe(2);
     const [first, second] = await groups.allInnerTexts();
-    expect(first).toMatch(/Doe Jane[^]*Head, 2024-05-17[^]*thin[^]*thick/);
+    expect(first).toMatch(/Doe Jane[^]*Head, 2024-05-17[^]*thick[^]*thin/);
+    expect(first?.match(/2024-05-17/g)).toHaveLength(1);
     expect(second).toMatch(/Doe Joe[^]*Knee[^]*knee/);
     // The same as one archive, of which the page reads nothing.
     await page.goto('about:blank');
@@ -210,10 +211,16 @@ describe('an upload of several volumes', () => {
     const panel = page.locator('.drop');
     await page.getByRole('heading', { name: 'Which series?' }).waitFor();
     await expect.poll(() => panel.locator('.choice canvas').count()).toBe(4);
-    const marks = panel.getByRole('checkbox');
-    await marks.nth(0).check();
-    await marks.nth(2).check();
-    await page.getByRole('button', { name: 'Read the 2 marked' }).click();
+    for (const name of ['lung', 'liver']) await panel.getByRole('checkbox', { name: `Mark ${name}` }).check();
+    // At the end of the list, and seen wherever this is scrolled.
+    const read = page.getByRole('button', { name: 'Read the 2 marked' });
+    await panel.locator('.choices').evaluate((list) => {
+      list.style.maxHeight = '120px';
+      list.scrollTop = 0;
+    });
+    const isInList = (): Promise<boolean> => read.evaluate((own) => own.getBoundingClientRect().bottom <= (own.closest('.choices')?.getBoundingClientRect().bottom ?? 0));
+    expect(await isInList()).toBe(true);
+    await read.click();
     await page.getByRole('heading', { name: '2 more series are in this upload' }).waitFor();
     // Its cards are named after patient and series.
     const names = page.locator('.card strong');
@@ -229,6 +236,12 @@ describe('an upload of several volumes', () => {
     await page.getByRole('heading', { name: '1 more series is in this upload' }).waitFor();
     await page.getByRole('button', { name: 'No more of these' }).click();
     await page.getByRole('heading', { name: 'Drop a volume here' }).waitFor();
+    // They are found by the patient, who is also told before one is erased.
+    await page.getByLabel('Search volumes').fill('roe ann');
+    await expect.poll(() => names.count()).toBe(3);
+    await page.getByRole('button', { name: 'Erase Roe Ann, liver' }).click();
+    await expect.poll(() => page.getByRole('dialog').innerText()).toContain('Roe Ann, liver, 2024-05-17 and its samples');
+    await page.keyboard.press('Escape');
     // The files were sent once.
     expect(queries.filter((query) => !query.includes('upload=')).length).toBe(1);
     expect(queries.length).toBe(4);

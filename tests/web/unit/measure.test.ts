@@ -49,6 +49,27 @@ describe('what is measured in slices', () => {
     measures.clear();
     expect(texts(5)).toEqual([]);
   });
+
+  it('has its text below all of its points, in the picture', () => {
+    const grounds = (points: readonly (readonly [number, number])[]): number[][] => {
+      const rects: number[][] = [];
+      const known: Record<string, unknown> = {
+        canvas: { width: 200, height: 100 },
+        getTransform: () => ({ transformPoint: (point: unknown) => point }),
+        measureText: () => ({ width: 50 }),
+        fillRect: (...rect: number[]) => rects.push(rect),
+      };
+      const context = new Proxy(known, { get: (own, name: string) => own[name] ?? ((): void => undefined) });
+      new SliceMeasures().paint(context as unknown as CanvasRenderingContext2D, 1, [{ points, text: '6 mm', isClosed: true }]);
+      return rects.slice(points.length);
+    };
+    // The last point is at the top.
+    const [[x = 0, y = 0] = []] = grounds([[10, 10], [10, 50], [40, 40], [40, 5]]);
+    expect(x).toBeGreaterThan(10);
+    expect(y).toBeGreaterThan(52);
+    const [[left = 0, top = 0, width = 0, height = 0] = []] = grounds([[10, 10], [195, 99]]);
+    expect([left + width <= 200, top + height <= 100]).toEqual([true, true]);
+  });
 });
 
 describe('the looks of slices', () => {

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { ApiError } from '@/api/problem';
 import type { UploadedVolume } from '@/api/types';
 import { mayBeMasks, outcomeOf, rejected } from '@/views/volumes/outcomes';
-import { openQuestion, spacingOf } from '@/views/volumes/remedies';
+import { openQuestion, sortedSeries, spacingOf } from '@/views/volumes/remedies';
 
 const question = new ApiError(422, 'Unusable volume', 'two series', [], { choices: [{ parameter: 'series', value: '1.2', title: 'head' }] });
 const wrong = new ApiError(422, 'Unusable volume', 'slices are missing');
@@ -23,6 +23,24 @@ describe('a question of the server', () => {
     expect(asked?.choices).toEqual({ member: 'a.dcm' });
     const after = rejected(outcomeOf(uploaded, {}), { member: 'a.dcm', series: '1.2' }, wrong);
     expect([after.error, after.asked]).toEqual([wrong, asked]);
+  });
+});
+
+describe('the series of an upload', () => {
+  it('are listed by patient, date of the study and title', () => {
+    const series = [
+      ['Brown^Al', '20240501', 'head'],
+      ['Carter^Bo', '20240501', 'head'],
+      ['Adams^Cy', '20240502', 'a'],
+      ['Adams^Cy', '20240501', 'head, series 10'],
+      ['Adams^Cy', '20240501', 'head, series 9'],
+    ].map(([name, date, title], n) => ({
+      parameter: 'series' as const,
+      value: String(n),
+      title: title ?? '',
+      series: { patient_name: name ?? '', patient_id: '', study_uid: date ?? '', study_description: '', study_date: date ?? '' },
+    }));
+    expect(sortedSeries(series).map(({ value }) => value)).toEqual(['4', '3', '2', '0', '1']);
   });
 });
 

@@ -8,13 +8,13 @@ import { mayBeVolume } from '@/volume/sniff';
 const volumes = [
   { id: 'a', name: 'knee 10', bytes: 5, modality: 'MR', dims: [1, 2, 3] },
   { id: 'b', name: 'Knee 9', bytes: 50, modality: 'CT', dims: [1, 2, 3] },
-  { id: 'c', name: null, bytes: 20, modality: null, format: 'nrrd', dims: [7, 8, 9] },
+  { id: 'c', name: null, bytes: 20, modality: null, format: 'nrrd', dims: [7, 8, 9], dicom: { patient_id: 'P-77' } },
 ] as unknown as Volume[];
 const ids = (text: string, order: string): string => foundVolumes(volumes, text, order).map(({ id }) => id).join('');
 
 describe('volumes', () => {
-  it('are found by all of the words, in name and kind', () => {
-    expect(['', 'KNEE', 'knee ct', 'nrrd', '7 × 8', 'elbow'].map((text) => ids(text, 'newest'))).toEqual(['abc', 'ab', 'b', 'c', 'c', '']);
+  it('are found by all of the words, in name, kind and patient', () => {
+    expect(['', 'KNEE', 'knee ct', 'nrrd', '7 × 8', 'p-77', 'elbow'].map((text) => ids(text, 'newest'))).toEqual(['abc', 'ab', 'b', 'c', 'c', 'c', '']);
   });
 
   it('are sorted', () => {

@@ -43,7 +43,8 @@ export function makeVariant(job: Job): MakeVariant {
 // apart in that format.
 export async function saveVariant(job: Job, volume: Volume | null, format: MeshFormat, change: Partial<JobParameters> = {}, label: Label | null = null): Promise<void> {
   const title = meshFormatTitle(format);
-  tell(`Making ${title}. It is saved when it is ready.`);
+  const alone = change.labels ? ` of ${surfaceInWords(change)} without the others, so that the surface may differ` : '';
+  tell(`Making ${title}${alone}. It is saved when it is ready.`);
   try {
     const { id } = await submitVariant(job, { ...change, formats: withGlb([format]) });
     const made = await client.follow(id);

@@ -4,7 +4,7 @@ import { colourAt } from './colour_map';
 
 // The texts over it.
 export interface Captions {
-  // Pixels for each of the page's.
+  // Pixels for each of the page's, or more.
   scale: number;
   // From top to bottom at the point that the camera looks at, in millimetres.
   seen: number;
@@ -19,6 +19,11 @@ const barHeight = 10;
 export function roundLength(most: number): number {
   const power = 10 ** Math.floor(Math.log10(most));
   return power * ([5, 2].find((factor) => factor * power <= most * (1 + 1e-9)) ?? 1);
+}
+
+// As on the page, and still legible where a wide picture is one of two on a sheet.
+export function captionScale({ width, height }: Pick<HTMLCanvasElement, 'width' | 'height'>, heightOnPage: number): number {
+  return Math.max(height / Math.max(1, heightOnPage), Math.min(width, 2 * height) / 450);
 }
 
 // Legible on what is dark and on what is light.

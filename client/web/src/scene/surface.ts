@@ -17,7 +17,7 @@ import { Frame, screenRatio, type Manner } from './frame';
 import { joinSeams } from './joining';
 import { Parts } from './parts';
 import { pickedAt, type Picked } from './picked';
-import { pictureOf } from './picture';
+import { captionScale, pictureOf } from './picture';
 import { Rulers } from './rulers';
 import type { SurfaceStyle } from './style';
 import { Uploading } from './uploading';
@@ -318,7 +318,7 @@ export class Surface {
   picture(distances: readonly string[]): Promise<Blob> {
     this.setCoarse(false);
     this.render({ steps: 1, sharpness: 2 / screenRatio() });
-    const captions = { scale: this.canvas.height / Math.max(1, this.host.clientHeight), seen: heightOf(this.place), distances };
+    const captions = { scale: captionScale(this.canvas, this.host.clientHeight), seen: heightOf(this.place), distances };
     this.draw();
     return pictureOf(this.canvas, captions, (context) => this.rulers.paintLabels(context, this.camera, captions.scale));
   }

@@ -32,6 +32,11 @@ export class KnownVolumes {
     return this.known.get(id) ?? null;
   }
 
+  // A volume of a list, with the patient if it was asked for.
+  detailed(volume: Volume): Volume {
+    return { ...volume, dicom: this.known.get(volume.id)?.dicom };
+  }
+
   nameOf(id: string): string {
     const volume = this.known.get(id);
     if (volume === undefined) return '';

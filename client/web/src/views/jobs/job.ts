@@ -12,7 +12,7 @@ import { placeOfText } from '../../scene/views';
 import { button, h } from '../../ui/dom';
 import { shortId } from '../../ui/format';
 import { refusal, tellError } from '../../ui/notices';
-import { go, noteInAddress, type Route } from '../../ui/route';
+import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { volumeName } from '../../volume/names';
 import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings, titleOf } from './job_panel';
@@ -47,7 +47,7 @@ function head(job: Job, volume: Volume | null): HTMLElement {
     h('p', inWords(job.parameters)),
     h('p.links', [
       volume && h('a', { href: changeLink(job) }, 'Change parameters'),
-      isFinal(job.state) && button('Erase', () => void eraseJob(job).then((isErased) => isErased && go(['jobs'])), { class: 'link' }),
+      isFinal(job.state) && button('Erase', () => void eraseJob(job).then((isErased) => isErased && location.replace(hashOf(['jobs']))), { class: 'link' }),
       h('span.faint', `job ${shortId(job.id)}`),
     ]),
   ]);

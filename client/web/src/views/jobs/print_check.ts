@@ -55,11 +55,9 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
   if (crossings && crossings.pairs > 0) {
     const places = crossings.places;
     const pairs = crossings.pairs === 1 ? '1 pair of triangles crosses. ' : `${formatCount(crossings.pairs)} pairs of triangles cross. `;
-    const isAsExtracted = parameters.passes === 0 && !parameters.regularize;
-    const extracted = { passes: 0, regularize: false, max_error_mm: null, triangles: null };
     points.push(
       point('bad', pairs, 'Programs for printers often repair this. ', places.length > 0 && button('Show them', () => show(places), { class: 'link', title: 'Marks them on the surface' }), ' ',
-        !isAsExtracted && remedy('Make it without smoothing', 'Starts a job with the triangles as they are extracted, which do not cross, and many more of them', extracted)),
+        parameters.passes > 0 && !parameters.untangle && remedy('Untangle them', 'Starts a job that moves triangles back where smoothing made them cross', { untangle: true })),
     );
   } else if (crossings) points.push(point('good', 'No triangle crosses another one.'));
   if (certificate) {

@@ -76,6 +76,7 @@ class Queue {
   private readonly filter: JobFilter;
   private list: JobList;
   private readonly erase = button('Erase', () => void this.eraseChosen(), { class: 'danger', disabled: true });
+  private readonly all = button('Choose all', () => this.chooseAll(), { class: 'quiet', title: 'Those of the list that have ended; once more for none' });
   private rows = new Map<string, Row>();
   private readonly volumes = new KnownVolumes();
 
@@ -95,6 +96,7 @@ class Queue {
       h('div.section-head', [
         h('h1', 'Jobs'),
         h('span.hint.grow', 'Stat jobs run first, then routine, then bulk. Within a priority, owners take turns.'),
+        this.all,
         this.together,
         this.compare,
         this.erase,
@@ -140,6 +142,7 @@ class Queue {
     const shown: Element = rows.length === 0 ? this.empty : this.table;
     if (this.body.firstElementChild !== shown) this.body.replaceChildren(shown);
     keepFocus(this.body, 'job', () => this.arrange(rows.map(({ element }) => element)));
+    this.showChosen();
   }
 
   // Leaves rows alone that stay: laying out a thousand of them takes long.
@@ -206,10 +209,22 @@ class Queue {
   }
 
   private async eraseChosen(): Promise<void> {
-    await eraseJobs([...this.chosen], (id) => {
+    await eraseJobs(this.erasable, (id) => {
       this.list.forget(id);
       this.choose(id, false);
     });
+    this.show();
+  }
+
+  // Nobody erases what a search hides.
+  private get erasable(): string[] {
+    return [...this.chosen].filter((id) => this.rows.has(id));
+  }
+
+  private chooseAll(): void {
+    const ids = this.list.jobs.filter(({ id, state }) => isFinal(state) && this.rows.has(id)).map(({ id }) => id);
+    const isOn = ids.some((id) => !this.chosen.has(id));
+    for (const id of ids) this.choose(id, isOn);
     this.show();
   }
 
@@ -217,7 +232,7 @@ class Queue {
     if (isOn) this.chosen.add(id);
     else this.chosen.delete(id);
     // So that the way back from a comparison leads to what was chosen.
-    noteInAddress({ chosen: [...this.chosen].join(',') });
+    if (this.chosen.size <= mostTogether) noteInAddress({ chosen: [...this.chosen].join(',') });
     this.showChosen();
   }
 
@@ -227,7 +242,6 @@ class Queue {
     if (listed.length === 0) return;
     for (const { id } of listed) this.chosen.add(id);
     this.show();
-    this.showChosen();
   }
 
   private showChosen(): void {
@@ -235,8 +249,9 @@ class Queue {
     const areMade = this.list.jobs.every(({ id, state }) => state === 'succeeded' || !this.chosen.has(id));
     this.together.disabled = !areMade || size < 2 || size > mostTogether;
     this.compare.disabled = !areMade || size < 2 || size > mostCompared;
-    this.erase.disabled = size === 0;
-    this.erase.textContent = size > 0 ? `Erase (${size})` : 'Erase';
+    const { length } = this.erasable;
+    this.erase.disabled = length === 0;
+    this.erase.textContent = length > 0 ? `Erase (${length})` : 'Erase';
     this.compare.textContent = size > 0 ? `Compare (${size})` : 'Compare';
   }
 

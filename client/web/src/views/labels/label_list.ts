@@ -1,5 +1,5 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
-import type { Job, LabelSummary, MeshFormat, Volume, Label } from '../../api/types';
+import type { Job, JobParameters, LabelSummary, MeshFormat, Volume, Label } from '../../api/types';
 import { labelOrders, labelsCsv, labelTitle, type LabelOrder, type LabelState } from '../../job/labels';
 import { holdsAllLabels, meshFormats } from '../../job/table';
 import { fileNameOf, makeVariant, saveVariant } from '../../job/variants';
@@ -60,11 +60,13 @@ export class LabelList {
         ),
         this.saveAs('Save what is shown as', (format) => {
           const file = state.hidden.value.size === 0 ? job.mesh?.files[format] : undefined;
+          const [only, ...others] = labels.filter(({ label }) => state.isShown(label));
           if (file) void saveFile(file.href, fileNameOf(job, volume, `.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
-          else void saveVariant(job, volume, format, { labels: this.shown });
+          else if (only && others.length === 0) this.saveLabel(only, format);
+          else void saveVariant(job, volume, format, this.shown);
         }),
-        button('Make what is shown', () => makeVariant(job)({ labels: this.shown }), { title: 'Starts a job of the labels that are shown, in all its formats' }),
-        button('Save as CSV', () => this.saveTable(search.found), { title: 'Saves a table of the labels that are found: voxels, volumes, areas, components' }),
+        button('Make what is shown', () => makeVariant(job)(this.shown), { title: 'Starts a job of the labels that are shown, in all its formats' }),
+        button('Save as CSV', () => this.saveTable(), { title: 'Saves a table of all labels: voxels, volumes, areas, components' }),
       ]),
     ]);
     this.element.append(opacityControl(), ...wallTable(scope, job, search));
@@ -74,9 +76,10 @@ export class LabelList {
     scope.onEnd(state.picked.subscribe((picked) => this.markPicked(picked)));
   }
 
-  private get shown(): [Label, ...Label[]] | 'all' {
+  // The changes that make a job one of the labels that are shown; none where all are.
+  private get shown(): Partial<JobParameters> {
     const [first, ...others] = this.state.labels.map(({ label }) => label).filter((label) => this.state.isShown(label));
-    return first === undefined ? 'all' : [first, ...others];
+    return first === undefined || this.state.hidden.value.size === 0 ? {} : { labels: [first, ...others] };
   }
 
   private rowOf(label: LabelSummary): Row {
@@ -124,8 +127,8 @@ export class LabelList {
     return row;
   }
 
-  private saveTable(labels: readonly LabelSummary[]): void {
-    const text = labelsCsv(labels, this.state.colours.value);
+  private saveTable(): void {
+    const text = labelsCsv(this.state.labels, this.state.colours.value);
     saveBlob(new Blob([text], { type: 'text/csv' }), fileNameOf(this.job, this.volume, '-labels.csv'));
   }
 
@@ -138,13 +141,15 @@ export class LabelList {
     return element;
   }
 
-  private download({ label, files = {} }: LabelSummary, title: string): HTMLElement {
-    const element = this.saveAs('Save', (format) => {
-      const file = files[format];
-      if (file) void saveFile(file.href, fileNameOf(this.job, this.volume, `-${label}.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
-      // Where each label has a file of its own, its surface is the one that is seen, with its walls to the others.
-      else void saveVariant(this.job, this.volume, format, holdsAllLabels(format) ? { labels: [label] } : {}, label);
-    });
+  private saveLabel({ label, files = {} }: LabelSummary, format: MeshFormat): void {
+    const file = files[format];
+    if (file) void saveFile(file.href, fileNameOf(this.job, this.volume, `-${label}.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
+    // Where each label has a file of its own, its surface is the one that is seen, with its walls to the others.
+    else void saveVariant(this.job, this.volume, format, holdsAllLabels(format) && this.state.labels.length > 1 ? { labels: [label] } : {}, label);
+  }
+
+  private download(label: LabelSummary, title: string): HTMLElement {
+    const element = this.saveAs('Save', (format) => this.saveLabel(label, format));
     element.setAttribute('aria-label', `Save ${title} as`);
     return element;
   }

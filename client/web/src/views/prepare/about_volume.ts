@@ -5,7 +5,7 @@ import { button, h } from '../../ui/dom';
 import { formatDims, volumeFormatTitle, formatSpacing, formatValue } from '../../ui/format';
 import { askText, tellError } from '../../ui/notices';
 import { go } from '../../ui/route';
-import { noteTexts, otherForm, skippedText, spanOf, volumeName } from '../../volume/names';
+import { areLabels, noteTexts, otherForm, skippedText, spanOf, volumeName } from '../../volume/names';
 import { orientation } from './orientation';
 import { uploads } from '../volumes/upload_panel';
 
@@ -97,7 +97,7 @@ export function sliceHelp(): HTMLElement {
 // Its name and what it is.
 export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement {
   // Formats other than DICOM do not say it. Then skin, soft tissue and bone have iso-values with names.
-  const ct = volume.modality === null && againButton(volume, 'This is a CT in Hounsfield units', { modality: 'ct' });
+  const ct = volume.modality === null && !areLabels(volume) && againButton(volume, 'This is a CT in Hounsfield units', { modality: 'ct' });
   return h('header.about', nameHeading(volume, onRenamed), h('p.facts', factsOf(volume)), ct);
 }
 

@@ -11,9 +11,10 @@ export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElem
   const files = Object.entries(estimate.bytes).map(
     ([format, bytes]) => `${meshFormatTitle(format)} ${formatBytes(bytes)}`,
   );
+  const stage = estimate.simplified_triangles === undefined ? '' : ' before simplification';
   const rows: [string, string][] = [
-    ['Triangles', formatCount(estimate.triangles)],
-    ['Vertices', formatCount(estimate.vertices)],
+    ['Triangles', `${formatCount(estimate.triangles)}${stage}`],
+    ['Vertices', `${formatCount(estimate.vertices)}${stage}`],
     ['Files', `about ${files.join(', ')}`],
     ['Time', `about ${formatMilliseconds(estimate.milliseconds)}`],
   ];

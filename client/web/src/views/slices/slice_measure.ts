@@ -105,8 +105,9 @@ export class SliceMeasures {
       context.strokeStyle = context.fillStyle = colour;
       context.stroke();
       for (const { x, y } of places) context.fillRect(x - 2 * ratio, y - 2 * ratio, 4 * ratio, 4 * ratio);
-      const last = places.at(-1);
-      if (last && text !== '') paintText(context, text, last.x + 8 * ratio, last.y, ratio);
+      // Below all of it, so that it covers none.
+      const lowest = places.reduce<{ x: number; y: number }>((one, next) => (next.y < one.y ? one : next), { x: 0, y: -Infinity });
+      if (text !== '') paintText(context, text, lowest.x + 8 * ratio, Math.min(lowest.y + 16 * ratio, context.canvas.height - fontSize * ratio), ratio);
       context.restore();
     }
   }

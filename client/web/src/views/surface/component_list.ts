@@ -149,8 +149,9 @@ export class ComponentList {
   }
 
   private show(isShown: (part: PartSummary) => boolean): void {
+    const hidden = this.all.filter((part) => !isShown(part)); // before any is forgotten
     this.hidden.clear();
-    for (const part of this.all) if (!isShown(part)) this.hidden.add(part.number);
+    for (const { number } of hidden) this.hidden.add(number);
     const { surface } = this;
     surface?.change(() => {
       surface.components.mark(null);

@@ -136,9 +136,10 @@ export class SurfacePane {
     const show = (): void => {
       const { bytes, totalBytes, totalTriangles } = latest;
       const shown = surface.trianglesShown;
+      const twice = totalTriangles > (this.job.mesh?.triangles ?? 0) ? ' (walls between two labels count twice)' : '';
       this.bar.value = (bytes / totalBytes + shown / Math.max(1, totalTriangles)) / 2;
       this.status.textContent =
-        bytes < totalBytes || shown > 0 ? `${formatCount(shown)} of ${formatCount(totalTriangles)} triangles` : 'Decoding';
+        bytes < totalBytes || shown > 0 ? `${formatCount(shown)} of ${formatCount(totalTriangles)} triangles${twice}` : 'Decoding';
     };
     surface.onShown = show;
     const timing = await loadMesh(this.job, this.scope.signal, {

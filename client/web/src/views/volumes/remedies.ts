@@ -77,10 +77,17 @@ function grouped<T>(all: readonly T[], key: (one: T) => string): [string, T[]][]
   return [...groups];
 }
 
-// Patients, their studies and the series of these. A single study needs no heading.
+// By patient, date of the study and title. The server tells no series' number unless titles are equal, which then end with it.
+export function sortedSeries(choices: readonly Choice[]): Choice[] {
+  const compare = (a: string, b: string): number => a.localeCompare(b, undefined, { numeric: true });
+  return choices
+    .map((choice) => ({ choice, ...studyOf(choice) }))
+    .sort((a, b) => compare(a.patient, b.patient) || compare(a.date, b.date) || compare(a.choice.title, b.choice.title))
+    .map(({ choice }) => choice);
+}
+
+// Patients, their studies and the series of these.
 function tree(rows: readonly Row[]): HTMLElement[] {
-  const studies = new Set(rows.map(({ choice }) => choice.series?.study_uid));
-  if (studies.size < 2) return rows.map(({ element }) => element);
   return grouped(rows, ({ choice }) => studyOf(choice).patient).map(([patient, own]) =>
     h('li.choice-group', [
       h('b', patient || 'Other patients'),
@@ -106,12 +113,14 @@ function choiceList(
     readMarked.hidden = marked.size === 0;
     readMarked.textContent = `Read the ${marked.size} marked`;
   };
-  const rows = choices.map((choice): Row => {
+  // A single study needs no heading.
+  const isByStudy = new Set(choices.map(({ series }) => series?.study_uid)).size > 1;
+  const rows = (parameter === 'series' ? sortedSeries(choices) : choices).map((choice): Row => {
     const { value, title } = choice;
     const picture = choice.series && choice.picture;
     const thumbnail = picture && h('canvas', { 'aria-hidden': 'true' });
     if (thumbnail) paintPicture(picture, thumbnail);
-    const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), h('span.faint', studyOf(choice).date));
+    const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), !isByStudy && h('span.faint', studyOf(choice).date));
     const seen = h('span.choice', thumbnail, text);
     const volume = stored.get(value);
     const isOneOfSeveral = parameter === 'series' && !volume && choices.length > 1;
@@ -121,7 +130,7 @@ function choiceList(
     return { choice, element };
   });
   const own = parameter === 'spacing' && h('li', spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
-  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...tree(rows), own, h('li', readMarked));
+  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...(isByStudy ? tree(rows) : rows.map(({ element }) => element)), own, h('li', readMarked));
   return parameter === 'volume' && choices.every(({ picture }) => picture) ? h('div.stack', timeChoice(choices, onChoice), list) : list;
 }
 

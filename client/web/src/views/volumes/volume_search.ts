@@ -9,11 +9,11 @@ const orders: Record<string, { title: string; compare: ((a: Volume, b: Volume) =
   size: { title: 'largest first', compare: (a, b) => b.bytes - a.bytes },
 };
 
-// The volumes whose name or kind contains all words, sorted by `order` of the table above.
+// The volumes whose name, kind or patient contains all words, sorted by `order` of the table above.
 export function foundVolumes(volumes: readonly Volume[], text: string, order: string): Volume[] {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   const found = volumes.filter((volume) => {
-    const told = `${volumeName(volume)} ${volumeKind(volume)}`.toLowerCase();
+    const told = `${volumeName(volume)} ${volumeKind(volume)} ${volume.dicom?.patient_id ?? ''}`.toLowerCase();
     return words.every((word) => told.includes(word));
   });
   const compare = orders[order]?.compare;

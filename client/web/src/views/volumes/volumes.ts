@@ -48,12 +48,6 @@ function whenSeen(element: HTMLElement, scope: Scope, run: () => void): void {
   scope.onEnd(() => seen.disconnect());
 }
 
-// Lists leave the patient out.
-async function namePatient(volume: Volume, title: HTMLElement): Promise<void> {
-  const { dicom } = await client.getVolume(volume.id);
-  title.textContent = title.title = volumeName({ ...volume, dicom });
-}
-
 function thumbnail(volume: Volume, scope: Scope): HTMLElement {
   const canvas = h('canvas.thumbnail', {
     width: thumbnailPixels,
@@ -65,12 +59,13 @@ function thumbnail(volume: Volume, scope: Scope): HTMLElement {
   return canvas;
 }
 
-function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChanged: () => void): HTMLElement {
+function volumeCard(volume: Volume, details: KnownVolumes, scope: Scope, onErased: () => void, onChanged: () => void): HTMLElement {
+  const nameNow = (): string => volumeName(details.detailed(volume));
   const erase = async (): Promise<void> => {
     let isWithJobs = false;
     const sure = await ask(
       'Erase this volume?',
-      `${volumeName(volume)} and its samples will be removed from the server.`,
+      `${nameNow()} and its samples will be removed from the server.`,
       'Erase',
       checkbox('Also erase the surfaces that were made from it', false, (isOn) => (isWithJobs = isOn)),
     );
@@ -93,25 +88,28 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
       tellError(error);
     }
   };
-  const name = volumeName(volume);
   const kind = volumeKind(volume);
-  const title = h('strong', { title: name }, name);
-  // A card without its patient is still a card.
-  if (volume.format === 'dicom') whenSeen(title, scope, () => void namePatient(volume, title).catch(() => undefined));
+  const title = h('strong');
+  const [renaming, erasing] = [button('Rename', () => void rename(), { class: 'quiet' }), button('Erase', () => void erase(), { class: 'quiet' })];
+  const showName = (): void => {
+    title.textContent = title.title = nameNow();
+    renaming.ariaLabel = `Rename ${nameNow()}`;
+    erasing.ariaLabel = `Erase ${nameNow()}`;
+  };
+  showName();
+  // Lists leave the patient out. A card without its patient is still a card.
+  if (volume.format === 'dicom') whenSeen(title, scope, () => void details.find([volume.id]).then(showName, () => undefined));
   return h('li.card', { 'data-volume': volume.id }, [
     h('a.card-link', { href: hashOf(['volumes', volume.id]) }, [
       thumbnail(volume, scope),
       h('span.card-text', [
         title,
-        h('span', name === kind ? volume.type : kind),
+        h('span', volumeName(volume) === kind ? volume.type : kind),
         h('span', formatSpacing(volume.spacing)),
         h('span.faint', `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
       ]),
     ]),
-    h('div.card-actions', [
-      button('Rename', () => void rename(), { class: 'quiet', 'aria-label': `Rename ${volumeName(volume)}` }),
-      button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${volumeName(volume)}` }),
-    ]),
+    h('div.card-actions', renaming, erasing),
   ]);
 }
 
@@ -146,6 +144,8 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
 class Home {
   readonly element: HTMLElement;
   private readonly known = new KnownVolumes();
+  // Those of DICOM, which have a patient.
+  private readonly details = new KnownVolumes();
   // The contents of each card, and its element.
   private readonly cards = new Map<string, { text: string; card: HTMLElement }>();
   private readonly list = h('ul.cards');
@@ -202,6 +202,9 @@ class Home {
     this.known.learn(page.volumes);
     const shown = jobs.slice(0, shownJobs);
     await this.known.find(shown.map(({ volume }) => volume));
+    const made = shown.flatMap(({ volume }) => this.known.get(volume) ?? []);
+    await this.findPatients(made);
+    this.known.learn(made.map((volume) => this.details.detailed(volume)));
     this.newest = page.volumes;
     this.intro.hidden = page.volumes.length > 0 || shown.length > 0;
     this.showVolumes([...page.volumes, ...this.older]);
@@ -236,20 +239,27 @@ class Home {
     this.isSearching = true;
     try {
       while (this.finding.isOn && this.next !== null && !this.scope.isOver) await this.loadMore();
+      if (this.finding.isOn) await this.findPatients([...this.newest, ...this.older]);
+      this.showVolumes([...this.newest, ...this.older]);
     } finally {
       this.isSearching = false;
     }
   }
 
+  private findPatients(volumes: readonly Volume[]): Promise<void> {
+    return this.details.find(volumes.filter(({ format }) => format === 'dicom').map(({ id }) => id));
+  }
+
   // Cards that stay as they are keep their elements, and with those their pictures and the focus.
   private showVolumes(volumes: readonly Volume[]): void {
     this.finding.element.hidden = volumes.length < 2;
-    const shown = this.finding.found(volumes);
-    const cards = shown.map((volume) => {
+    const byId = new Map(volumes.map((volume) => [volume.id, volume]));
+    const shown = this.finding.found(volumes.map((volume) => this.details.detailed(volume)));
+    const cards = shown.flatMap(({ id }) => byId.get(id) ?? []).map((volume) => {
       const text = JSON.stringify(volume);
       const known = this.cards.get(volume.id);
       if (known?.text === text) return known.card;
-      const card = volumeCard(volume, this.scope, () => this.erased(volume.id), () => void this.renewed().catch(tellError));
+      const card = volumeCard(volume, this.details, this.scope, () => this.erased(volume.id), () => void this.renewed().catch(tellError));
       this.cards.set(volume.id, { text, card });
       return card;
     });
