@@ -17,6 +17,8 @@ import { VolumeSearch } from './volume_search';
 const shownJobs = 8;
 const thumbnailPixels = 112;
 const refreshEvery = 2000;
+// Patients that are asked for at once.
+const mostAsked = 50;
 
 // The middle axial slice, turned as radiologists look.
 async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal: AbortSignal): Promise<void> {
@@ -239,7 +241,8 @@ class Home {
     this.isSearching = true;
     try {
       while (this.finding.isOn && this.next !== null && !this.scope.isOver) await this.loadMore();
-      if (this.finding.isOn) await this.findPatients([...this.newest, ...this.older]);
+      const all = [...this.newest, ...this.older];
+      for (let at = 0; at < all.length && this.finding.isOn && !this.scope.isOver; at += mostAsked) await this.findPatients(all.slice(at, at + mostAsked));
       this.showVolumes([...this.newest, ...this.older]);
     } finally {
       this.isSearching = false;
