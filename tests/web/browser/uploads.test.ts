@@ -229,6 +229,10 @@ describe('an upload of several volumes', () => {
       'Roe Ann, lung, 2024-05-17',
     ]);
     await expect.poll(() => panel.locator('.choices .stored a').count()).toBe(2);
+    // Also after a reload.
+    await page.reload();
+    await page.getByRole('heading', { name: 'Which series?' }).waitFor();
+    await expect.poll(() => panel.locator('.choices .stored a').count()).toBe(2);
     // One of the others, which is opened, and the last one is still there.
     await panel.getByRole('button', { name: 'bone' }).click();
     await page.waitForURL(volumePage);
@@ -244,7 +248,7 @@ describe('an upload of several volumes', () => {
     await page.keyboard.press('Escape');
     // The files were sent once.
     expect(queries.filter((query) => !query.includes('upload=')).length).toBe(1);
-    expect(queries.length).toBe(4);
+    expect(queries.length).toBe(5);
   });
 });
 

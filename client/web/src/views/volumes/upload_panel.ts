@@ -2,12 +2,13 @@
 import { volumeFormats } from '../../../generated/parameters';
 import { client } from '../../client';
 import { ApiError, asApiError, mayPass } from '../../api/problem';
-import type { RawDescription, UploadedVolume } from '../../api/types';
+import type { RawDescription, UploadedVolume, Volume } from '../../api/types';
 import { bringIntoView, button, h, icon } from '../../ui/dom';
 import { refusal, tell, tellError } from '../../ui/notices';
 import { currentRoute, go, hashOf, isVolumeList } from '../../ui/route';
 import { Signal } from '../../ui/signal';
 import { filesOfDrop, filesOfList, gather, type Gathered } from '../../volume/gather';
+import { KnownVolumes } from '../../volume/known';
 import { noteTexts, skippedText, volumeName } from '../../volume/names';
 import { faultOf } from '../../volume/sniff';
 import type { NamedFile } from '../../volume/tar';
@@ -37,6 +38,14 @@ interface Rest {
 }
 
 const idle = '';
+const leftKey = 'isomesh-upload';
+
+// An upload with more to choose, for after a reload: no more than its name and ids, because others may use this browser later.
+interface Left {
+  name: string;
+  kept: string;
+  stored: [string, string][];
+}
 
 // The whole page has one. An upload goes on while other views are shown; `state` says in a word what it does.
 export class UploadPanel {
@@ -53,6 +62,7 @@ export class UploadPanel {
   private last: { id: string; gathered: Gathered; choices: Choices } | null = null;
   private waiting: Gathered[] = [];
   private rests: Rest[] = [];
+  private left = sessionStorage.getItem(leftKey);
 
   constructor() {
     this.element = h('section.drop', { 'aria-label': 'Upload a volume' }, [
@@ -63,6 +73,24 @@ export class UploadPanel {
     ]);
     this.takeChosenFiles();
     this.showIdle();
+  }
+
+  // Offers what was to be chosen before the page was loaded again.
+  async restore(): Promise<void> {
+    const text = this.left;
+    this.left = null;
+    if (text === null) return;
+    const { name, kept, stored } = JSON.parse(text) as Left;
+    const volumes = new KnownVolumes();
+    await volumes.find(stored.map(([, id]) => id));
+    const read = stored.map(([series, id]) => [series, volumes.get(id)] as const).filter((one): one is [string, Volume] => one[1] !== null);
+    if (!this.running) await this.send({ name, kept, stored: new Map(read), count: 1, files: [], body: new Blob() });
+  }
+
+  private keepLeft({ name, kept, stored }: Gathered): void {
+    if (kept === undefined) return;
+    const left: Left = { name, kept, stored: [...stored].map(([series, { id }]) => [series, id]) };
+    sessionStorage.setItem(leftKey, JSON.stringify(left));
   }
 
   get isBusy(): boolean {
@@ -163,7 +191,7 @@ export class UploadPanel {
     } catch (error) {
       this.running = null;
       const failure = asApiError(error);
-      if (kept !== undefined && failure.status === 410) {
+      if (kept !== undefined && failure.status === 410 && gathered.body.size > 0) {
         // It was chosen too late.
         gathered.kept = undefined;
         await this.send(gathered, addition);
@@ -215,6 +243,7 @@ export class UploadPanel {
   // The series that were not chosen are offered after each one that is read, until there is none or a person says no.
   private showRest(rest: Rest): void {
     const { gathered, asked } = rest;
+    this.keepLeft(gathered);
     const no = (): void => {
       this.keepRest(gathered, null);
       this.showIdle();
@@ -270,6 +299,7 @@ export class UploadPanel {
       this.showRest(rest);
       return;
     }
+    sessionStorage.removeItem(leftKey);
     this.body.replaceChildren(
       icon(arrow),
       h('h2', 'Drop a volume here'),
@@ -310,7 +340,9 @@ export class UploadPanel {
   }
 
   // Nothing is wrong: the upload holds more than one.
-  private showQuestion(question: string, { name }: Gathered, lists: readonly HTMLElement[]): void {
+  private showQuestion(question: string, gathered: Gathered, lists: readonly HTMLElement[]): void {
+    const { name } = gathered;
+    this.keepLeft(gathered);
     this.element.classList.remove('busy');
     this.state.value = 'Upload: your choice is needed';
     if (!isPanelShown()) tell(h('a', { href: hashOf([]) }, `${name}: ${question}`));

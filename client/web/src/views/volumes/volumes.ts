@@ -192,6 +192,7 @@ class Home {
         this.surfaces,
       ]),
     ]);
+    uploads.restore().catch(tellError);
     uploads.onStored = () => void this.refresh().catch(tellError);
     scope.onEnd(() => (uploads.onStored = null));
   }
