@@ -51,6 +51,9 @@ describe('the list of jobs', () => {
     await page.getByRole('searchbox').fill('iso 91');
     await expect.poll(() => rows.count()).toBe(1);
     await expect.poll(() => noted(page, 'search')).toBe('iso 91');
+    const id = await rows.first().getAttribute('data-job');
+    await page.getByRole('searchbox').fill(id?.slice(-8) ?? '');
+    await expect.poll(() => rows.count()).toBe(1);
     await page.getByRole('searchbox').fill('');
     await page.getByLabel('State').selectOption('failed');
     await expect.poll(() => rows.count()).toBe(0);

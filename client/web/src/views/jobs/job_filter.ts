@@ -4,6 +4,7 @@ import type { Job, JobState } from '../../api/types';
 import type { JobSource } from '../../job/job_list';
 import { inWords, surfaceInWords } from '../../job/parameters';
 import { field, h, select } from '../../ui/dom';
+import { shortId } from '../../ui/format';
 import { noteInAddress } from '../../ui/route';
 
 const states = ['queued', 'running', 'succeeded', 'failed', 'cancelled'] as const satisfies readonly JobState[];
@@ -67,7 +68,7 @@ export class JobFilter implements JobSource {
     const words = search.toLowerCase().split(/\s+/).filter(Boolean);
     const found = jobs.filter((job) => {
       const text = [nameOf(job), surfaceInWords(job.parameters), inWords(job.parameters)].join(' ').toLowerCase();
-      return (!state || job.state === state) && words.every((word) => text.includes(word) || job.id.endsWith(word));
+      return (!state || job.state === state) && words.every((word) => text.includes(word) || word === shortId(job.id) || word === job.id);
     });
     const compare = sort && sort in by ? by[sort as keyof typeof by] : null;
     return compare ? found.sort(compare) : found;
