@@ -63,6 +63,7 @@ export class UploadPanel {
   private waiting: Gathered[] = [];
   private rests: Rest[] = [];
   private left = sessionStorage.getItem(leftKey);
+  private isRestoring = false;
 
   constructor() {
     this.element = h('section.drop', { 'aria-label': 'Upload a volume' }, [
@@ -84,7 +85,10 @@ export class UploadPanel {
     const volumes = new KnownVolumes();
     await volumes.find(stored.map(([, id]) => id));
     const read = stored.map(([series, id]) => [series, volumes.get(id)] as const).filter((one): one is [string, Volume] => one[1] !== null);
-    if (!this.running) await this.send({ name, kept, stored: new Map(read), count: 1, files: [], body: new Blob() });
+    if (this.running) return;
+    this.isRestoring = true;
+    await this.send({ name, kept, stored: new Map(read), count: 1, files: [], body: new Blob() });
+    this.isRestoring = false;
   }
 
   private keepLeft({ name, kept, stored }: Gathered): void {
@@ -107,6 +111,8 @@ export class UploadPanel {
       if (!this.running) return void this.begin(gathered);
       this.waiting.push(gathered);
       this.showQueue();
+      // What a person brings now counts more.
+      if (this.isRestoring) this.running.abort();
     }
   }
 
