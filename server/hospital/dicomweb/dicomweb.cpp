@@ -21,7 +21,7 @@ constexpr const char* kSeriesFields =
     "includefield=00201209&includefield=00080060&includefield=0008103E";
 constexpr const char* kPatientField = "includefield=00100020";
 constexpr const char* kStudyFields =
-    "includefield=00080020&includefield=00081030&includefield=00100010&includefield=00100020";
+    "includefield=00080020&includefield=00081030&includefield=00100010";
 // Limits of a person's search.
 constexpr std::size_t kMostStudies = 1000;
 constexpr std::size_t kMostSeries = 2000;
@@ -53,7 +53,7 @@ std::string encoded_pattern(std::string_view pattern) {
 
 // The query of a search for studies.
 std::string studies_query(const SeriesQuery& query) {
-  std::string text = '?' + std::string(kStudyFields);
+  std::string text = '?' + std::string(kStudyFields) + '&' + kPatientField;
   const auto add = [&text](const char* name, const std::string& value) {
     if (!value.empty()) text.append("&").append(name).append("=").append(value);
   };
@@ -71,7 +71,7 @@ std::string short_text(const std::string& text) {
   return printable(beginning(text, kLongest));
 }
 
-// What a study says of each of its series.
+// The part of a series' description that its study has.
 PacsSeries study_of(const PeersObject& study) {
   return {.study = study.study,
           .patient_id = short_text(study.patient_id),

@@ -170,7 +170,7 @@ struct PacsStatus {
   bool operator==(const PacsStatus&) const = default;
 };
 
-// Which series of a PACS to search for; empty members match everything.
+// A search for series of a PACS; empty members match everything.
 struct SeriesQuery {
   std::string patient_id = {};    // * and ? are wildcards, as in the next
   std::string patient_name = {};  // as DICOM writes it: FAMILY^GIVEN

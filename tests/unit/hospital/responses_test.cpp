@@ -38,6 +38,7 @@ class TellingPacs {
     http_.Get("/studies/(.*)/series",
               [](const httplib::Request& request, httplib::Response& response) {
                 const std::string study = request.matches[1];
+                if (study == "3.2") std::this_thread::sleep_for(std::chrono::seconds(2));
                 std::string series = one_series(study + ".1", "scout");
                 if (study == "1.2") series += ',' + one_series(study + ".2", std::string(300, 'a'));
                 response.set_content('[' + series + ']', "application/dicom+json");
@@ -159,6 +160,19 @@ TEST(SearchOfAPerson, ListsTheNewestOfManyStudiesAndTheOneThatWasAskedFor) {
   const Error error = test::error_of([&] { search({.study = "2.140"}); });
   EXPECT_EQ(error.code(), ErrorCode::kPacsRefused);
   EXPECT_THAT(error.what(), testing::HasSubstr("404"));
+}
+
+TEST(SearchOfAPerson, HasWhatWasFoundInItsTime) {
+  TellingPacs pacs;
+  pacs.studies = {TellingPacs::study("3.1", "\"Roe\""), TellingPacs::study("3.2", "\"Roe\"")};
+  jobs::ImportRunner runner({.bounds = {}, .program = ISOMESH_IMPORT});
+  const test::TemporaryFolder folder;
+  DicomWeb web(pacs.settings(), folder.path(), 1 << 20, runner);
+  const PacsSeriesList part =
+      web.search({.patient_id = "P"}, steady_clock::now() + std::chrono::milliseconds(1500), {});
+  EXPECT_FALSE(part.complete);
+  ASSERT_THAT(part.series, SizeIs(1));
+  EXPECT_EQ(part.series[0].study, "3.1");
 }
 
 // The program misbehaves as the response says.

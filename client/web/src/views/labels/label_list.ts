@@ -144,7 +144,7 @@ export class LabelList {
   private saveLabel({ label, files = {} }: LabelSummary, format: MeshFormat): void {
     const file = files[format];
     if (file) void saveFile(file.href, fileNameOf(this.job, this.volume, `-${label}.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
-    // Where each label has a file of its own, its surface is the one that is seen, with its walls to the others.
+    // A label with a file of its own has the surface that is seen, with its walls to the others.
     else void saveVariant(this.job, this.volume, format, holdsAllLabels(format) && this.state.labels.length > 1 ? { labels: [label] } : {}, label);
   }
 

@@ -343,7 +343,7 @@ export class SliceView {
       press.moved ||= Math.hypot(dx, dy) > (event.pointerType === 'mouse' ? 3 : 10);
       // A finger that goes up or down scrolls the page, which the browser sees to (touch-action).
       if (event.pointerType !== 'mouse' && Math.abs(dy) > Math.abs(dx) && !press.isWindowing) return;
-      // Whoever measures may slip, and means no window.
+      // A slip while measuring means no window.
       press.isWindowing ||= press.moved && (this.host.measures?.kind.value ?? null) === null;
       if (press.isWindowing) this.host.setWindow(draggedWindow(press.window, dx, dy));
     });

@@ -111,7 +111,7 @@ export class UploadPanel {
       if (!this.running) return void this.begin(gathered);
       this.waiting.push(gathered);
       this.showQueue();
-      // What a person brings now counts more.
+      // A file that a person brings now counts more.
       if (this.isRestoring) this.running.abort();
     }
   }
