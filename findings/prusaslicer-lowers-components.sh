@@ -19,7 +19,7 @@ apt-get download $pinned >apt.log 2>&1
 for package in *.deb; do dpkg -x "$package" tree; done
 machine="$(uname -m)-linux-gnu"
 export LD_LIBRARY_PATH="$t/tree/usr/lib/$machine:$t/tree/lib/$machine"
-cat >make.py <<'P'
+python3 - <<'P'
 import zipfile
 def cube(id, x, z):
     points = [(x + a, b, z + c) for c in (0, 10) for b in (0, 10) for a in (0, 10)]
@@ -42,15 +42,12 @@ write('items.3mf', '', '<item objectid="1"/><item objectid="2"/>')
 P
 cat >heights.py <<'P'
 import struct
-data = open('out.stl', 'rb').read()
-lowest = {}
+data, heights = open('out.stl', 'rb').read(), {}
 for at in range(84, len(data), 50):
     corners = [struct.unpack_from('<3f', data, at + 12 * corner) for corner in (1, 2, 3)]
-    cube = sum(p[0] for p in corners) > 30
-    lowest[cube] = min([lowest.get(cube, 99)] + [p[2] for p in corners])
-print('the lower cube begins at %.0f mm, the upper one at %.0f mm' % (lowest[False], lowest[True]))
+    heights.setdefault(sum(p[0] for p in corners) > 30, []).extend(p[2] for p in corners)
+print('the lower cube begins at %.0f mm, the upper one at %.0f mm' % (min(heights[False]), min(heights[True])))
 P
-python3 make.py
 seen=
 for run in 'components' 'items' 'components --no-ensure-on-bed'; do
   set -- $run
