@@ -49,3 +49,20 @@ describe('a volume', () => {
     }
   });
 });
+
+describe('a volume whose record is damaged', () => {
+  it('hides neither the other volumes nor the jobs and the surface that were made from it', async ({ page, daemon }) => {
+    const [volume, other] = [await daemon.upload(ballNrrd(16, 5, 14)), await daemon.upload(ballNrrd(16, 5, 15))];
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
+    const problem = { title: 'Internal error', status: 500, detail: 'The service failed on this request; its log has the reason.' };
+    await page.route(`**/v1/volumes/${volume}`, (route) => route.fulfill({ status: 500, contentType: 'application/problem+json', body: JSON.stringify(problem) }));
+    await page.goto(daemon.url);
+    await page.locator(`[data-volume="${other}"]`).waitFor();
+    await page.goto(`${daemon.url}/#/jobs`);
+    const row = page.locator(`[data-job="${id}"]`);
+    await expect.poll(() => row.innerText()).toContain('unreadable volume');
+    await row.getByRole('link').click();
+    await expect.poll(() => page.locator('.of-volume').innerText()).toBe('unreadable volume');
+    await page.locator('.pane[data-loaded]').waitFor();
+  });
+});

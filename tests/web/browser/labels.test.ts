@@ -281,6 +281,14 @@ describe('the surfaces of labels', () => {
     now = await seen(view);
     expect(now.blue).toBe(0);
     expect(now.green).toBeGreaterThan(1000);
+
+    // Nothing is no surface, and not that of all labels.
+    await page.getByRole('button', { name: 'Hide all' }).click();
+    await page.getByRole('button', { name: 'Make what is shown' }).click();
+    await page.getByText('No label is shown.').waitFor();
+    await page.getByLabel('Save what is shown as').selectOption('ply');
+    await expect.poll(() => page.getByText('No label is shown.').count()).toBe(2);
+    expect(page.url()).toContain(made.id);
   });
 
   it('say what they are when they are clicked, and obey keys', async ({ page }) => {

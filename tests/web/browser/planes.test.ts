@@ -99,6 +99,21 @@ describe('an oblique plane', () => {
   });
 });
 
+describe('a cut', () => {
+  it('shows no other slice where its own cannot be fetched', async ({ page, daemon }) => {
+    const { id } = await daemon.make({ volume: ball, iso: 100, formats: ['glb'] });
+    await openSurface(at, `${id}?cut=z24%2B`);
+    const slice = page.locator('.viewport[data-slice]');
+    await slice.waitFor();
+    await page.route('**/slice.png*', (route) => route.fulfill({ status: 500, contentType: 'application/problem+json', body: '{"title":"Internal error","status":500}' }));
+    await page.getByLabel('Position of the cut').fill('30');
+    await expect.poll(() => slice.count()).toBe(0);
+    await page.unroute('**/slice.png*');
+    await page.getByLabel('Position of the cut').fill('31');
+    await page.locator('.viewport[data-slice="z/31"]').waitFor();
+  });
+});
+
 describe('a free cut', () => {
   it('is parallel to the screen, is moved, and is in the address', async ({ page, daemon }) => {
     const { id } = await daemon.make({ volume: ball, iso: 100, formats: ['glb'] });

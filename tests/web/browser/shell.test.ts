@@ -33,6 +33,25 @@ describe('the page', () => {
     await page.waitForURL(/#\/jobs$/);
   });
 
+  it('leaves a person who went elsewhere there when a job has been accepted', async ({ page, daemon }) => {
+    let answer = (): void => undefined;
+    const held = new Promise<void>((resolve) => (answer = resolve));
+    await page.route('**/v1/jobs', async (route) => {
+      if (route.request().method() === 'POST') await held;
+      await route.continue();
+    });
+    await page.goto(`${daemon.url}/#/volumes/${ball}`);
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.getByRole('link', { name: 'Jobs', exact: true }).click();
+    await page.locator('h1', { hasText: 'Jobs' }).waitFor();
+    const accepted = page.waitForResponse((response) => response.request().method() === 'POST' && response.url().endsWith('/v1/jobs'));
+    answer();
+    await accepted;
+    // It is told there.
+    await page.locator('.toast a', { hasText: 'The surface for' }).waitFor();
+    expect(new URL(page.url()).hash).toBe('#/jobs');
+  });
+
   it('is light on paper, and without what one presses', async ({ page, daemon }) => {
     await page.emulateMedia({ colorScheme: 'dark', media: 'print' });
     for (const place of ['', `volumes/${ball}`, `jobs/${job}`, 'jobs']) {

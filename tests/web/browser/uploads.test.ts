@@ -229,8 +229,13 @@ describe('an upload of several volumes', () => {
       'Roe Ann, lung, 2024-05-17',
     ]);
     await expect.poll(() => panel.locator('.choices .stored a').count()).toBe(2);
-    // Also after a reload.
+    // Also after a reload, and if the server cannot be reached at first.
+    const oneVolume = /\/v1\/volumes\/[0-9a-f]{64}$/;
+    await page.route(oneVolume, (route) => route.abort());
     await page.reload();
+    await page.locator('.toast.bad').waitFor();
+    await page.unroute(oneVolume);
+    for (const place of ['Jobs', 'Volumes']) await page.getByRole('link', { name: place, exact: true }).click();
     await page.getByRole('heading', { name: 'Which series?' }).waitFor();
     await expect.poll(() => panel.locator('.choices .stored a').count()).toBe(2);
     // One of the others, which is opened, and the last one is still there.

@@ -163,6 +163,20 @@ describe('while the server is busy', () => {
     expect(waited > 20 && waited <= 32, String(clock.pauses)).toBe(true);
   });
 
+  it('its time is no outage of an upload', async () => {
+    const cut = (): never => {
+      throw new TypeError('fetch failed');
+    };
+    const state = (): Response => new Response(null, { status: 204, headers: { 'Upload-Offset': '0', 'Upload-Complete': '?0' } });
+    const busy = (): Response => new Response(null, { status: 503, headers: { 'Retry-After': '100' } });
+    const stored = (): Response => new Response('{"id":"a"}', { status: 201, headers: { Location: '/v1/uploads/a' } });
+    const answers = [stored, cut, busy, state, cut, busy, state, stored];
+    vi.stubGlobal('fetch', () => Promise.resolve().then(() => (answers.shift() ?? cut)()));
+    const { volumes } = await client.upload(new Uint8Array(9));
+    expect(volumes[0]?.volume).toEqual({ id: 'a' });
+    expect(answers).toEqual([]);
+  });
+
   it('nobody begins to wait for what comes too late', async () => {
     refusal = { status: 503, headers: { 'Retry-After': '3600' }, times: Infinity };
     expect((await rejectionOf(client.getJob(id))).retryAfter).toBe(3600);

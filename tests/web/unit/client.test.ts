@@ -5,6 +5,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { ApiError, Client, type Job } from '@/api/index';
+import { Connection } from '@/api/connection';
 import { Daemon, eventually, id } from './daemon';
 
 let first: Daemon;
@@ -47,6 +48,35 @@ describe('two clients in one process', () => {
   });
 });
 
+describe('an address of a response', () => {
+  it('leads to no other server', async () => {
+    const others = new Client({ server: first.address, token: 'secret' });
+    const job = await others.getJob(id);
+    const here = second.address.replace('http:', '');
+    for (const href of [here, here.replaceAll('/', '\\'), `@${here.slice(2)}/mesh.glb`, `.example${here}`, second.address, '']) {
+      const moved = { ...job, mesh: { files: { glb: { href } } } } as unknown as Job;
+      expect(await rejectionOf(others.meshOf(moved, 'glb')), href).toMatchObject({ status: -1 });
+    }
+    expect(second.asked).toEqual([]);
+  });
+
+  it('leads to no other server from a page that names none', () => {
+    const own = new Connection('', 'secret');
+    for (const gap of ['', '\t', '\r', '\n', '\r\n\t']) {
+      for (const href of [`/${gap}/other.example/mesh.glb`, `/${gap}\\other.example/mesh.glb`]) {
+        expect(() => own.addressOf(href), JSON.stringify(href)).toThrow(ApiError);
+      }
+    }
+    expect(() => own.addressOf('/v1/jobs/\n')).toThrow(ApiError);
+    expect(own.addressOf('/v1/jobs/a//b c?state=queued')).toBe('/v1/jobs/a//b c?state=queued');
+  });
+
+  it('is not followed if it is that of a redirect, which a page is not shown', async () => {
+    vi.stubGlobal('fetch', () => Promise.resolve(Object.defineProperty(Response.error(), 'type', { value: 'opaqueredirect' })));
+    expect(await rejectionOf(client.getJob(id))).toMatchObject({ status: -1, title: 'The server redirects to another address' });
+  });
+});
+
 describe('a window of huge values', () => {
   it('is asked for as it is', async () => {
     const window: [number, number] = [-1e30, 1e30];
@@ -54,6 +84,18 @@ describe('a window of huge values', () => {
       await rejectionOf(asking);
       expect(first.query.get('window')?.split(',').map(Number)).toEqual(window);
     }
+  });
+});
+
+describe('a redirect', () => {
+  it('is not followed: neither the token nor the volume goes to another server', async () => {
+    first.proxy = (response) => response.writeHead(307, { Location: `${second.address}/v1/volumes` }).end();
+    const named = new Client({ server: first.address, token: 'secret' });
+    for (const asking of [named.upload(new Uint8Array([1, 2, 3]), { name: 'a.nrrd' }), named.follow(id), named.getVolume('a')]) {
+      expect(await rejectionOf(asking)).toMatchObject({ status: -1, title: 'The server redirects to another address' });
+    }
+    expect(first.tokens).toEqual(new Set(['Bearer secret']));
+    expect(second.asked).toEqual([]);
   });
 });
 
@@ -65,6 +107,25 @@ describe('the labels of a job', () => {
 
   it('have walls, which come from all pages', async () => {
     expect((await client.wallsOfJob(id)).map(({ b }) => b)).toEqual([null, 4]);
+  });
+});
+
+describe('a list of another API', () => {
+  it.each(['[]', '{"labels":7,"walls":7,"next":null}', '{"labels":null,"walls":null}'])('is an error: %s', async (body) => {
+    first.proxy = (response) => void response.end(body);
+    for (const list of [client.labelsOf(id, 0), client.labelsOfJob(id), client.wallsOfJob(id)]) {
+      expect(await rejectionOf(list)).toMatchObject({ status: -1, title: 'The response is not one of isomeshd' });
+    }
+  });
+
+  it('ends with a page that names no next one, or has nothing', async () => {
+    for (const body of ['{"labels":[{"label":1}]}', '{"labels":[],"next":"more"}']) {
+      first.asked.length = 0;
+      first.proxy = (response) => void response.end(body);
+      await client.labelsOf(id, 0);
+      await client.labelsOfJob(id);
+      expect(first.asked).toHaveLength(2);
+    }
   });
 });
 

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { prepare, type Block } from '@/mesh/blocks';
-import { PartFinder } from '@/mesh/part_finder';
+import { foundAnew, PartFinder } from '@/mesh/part_finder';
 
 // The sides of a cube of that edge, which begins there; some of its triangles.
 function cube(edge: number, begin: number, triangles = [...Array(12).keys()]): Block {
@@ -32,6 +32,16 @@ describe('the parts of a surface', () => {
     const index = finder.indexOf(0, (number) => number === finder.partOf(0, 8)?.number);
     expect([index.length, Math.min(...index)]).toEqual([36, 8]);
     expect(finder.indexOf(0, () => true)).toEqual(both.index);
+  });
+
+  it('are found again in a surface whose blocks came in another order', () => {
+    const [small, large, other] = [cube(1, 0), cube(2, 100), cube(1, 50)];
+    const [first, second] = [found(small, large, other), found(other, small, large)];
+    const numbers = foundAnew(first.all, second.all);
+    expect(numbers).toEqual([small, large, other].map((block) => second.partOf([other, small, large].indexOf(block), 0)?.number));
+    expect(numbers).not.toEqual(first.all.map(({ number }) => number));
+    expect(first.partOf(1, 0)).toMatchObject({ low: [100, 100, 100], high: [102, 102, 102] });
+    expect(foundAnew(first.all, [])).toEqual([]);
   });
 
   it('go on across the seams of blocks', () => {

@@ -2,8 +2,7 @@
 import { Connection } from './connection';
 import { follow } from './follow';
 import { JobEvents } from './job_events';
-import { asApiError } from './problem';
-import { sleep } from './sleep';
+import { jsonOf, notTheApi } from './problem';
 import type {
   Axis,
   ClientOptions,
@@ -36,7 +35,6 @@ import type {
 import { upload } from './upload';
 
 const volumesPerPage = 60;
-const submitRetries = 3;
 
 // A key only has to differ from others, so Math.random will do. Node 18 has no global `crypto`, and browsers have
 // randomUUID only behind TLS.
@@ -50,13 +48,15 @@ function queryOf(values: Readonly<Record<string, string | number | undefined>>):
   return given.length === 0 ? '' : `?${new URLSearchParams(given.map(([name, value]) => [name, String(value)])).toString()}`;
 }
 
-// All that the pages of a list hold.
+// All that the pages of a list hold. A page without items is the last.
 async function allPages<Page extends { next: string | null }, T>(pageAt: (cursor: string) => Promise<Page>, held: (page: Page) => T[]): Promise<T[]> {
   const all: T[] = [];
   for (let cursor: string | null = ''; cursor !== null; ) {
     const page: Page = await pageAt(cursor);
-    all.push(...held(page));
-    cursor = page.next;
+    const items: unknown = held(page);
+    if (!Array.isArray(items)) throw notTheApi();
+    all.push(...(items as T[]));
+    cursor = items.length > 0 && page.next ? page.next : null;
   }
   return all;
 }
@@ -135,14 +135,14 @@ export class Client {
 
   /** Lists the labels of a volume in ascending order. Samples with the value `background` belong to none. */
   async labelsOf(id: string, background: number, signal?: GlobalAbortSignal): Promise<VolumeLabels> {
-    const pageAt = (cursor = ''): Promise<VolumeLabels> => this.connection.json(`${volumePath(id)}/labels${queryOf({ background, cursor })}`, { signal });
-    const list = await pageAt();
-    while (list.next !== null) {
-      const page = await pageAt(list.next);
-      list.labels.push(...page.labels);
-      list.next = page.next;
-    }
-    return list;
+    const pages: VolumeLabels[] = [];
+    const pageAt = async (cursor: string): Promise<VolumeLabels> => {
+      const page: VolumeLabels = await this.connection.json(`${volumePath(id)}/labels${queryOf({ background, cursor })}`, { signal });
+      pages.push(page);
+      return page;
+    };
+    const labels = await allPages(pageAt, (page) => page.labels);
+    return { ...(pages[0] as VolumeLabels), labels, next: null };
   }
 
   /** A slice as PNG; `window` has the values that are black and white. */
@@ -178,19 +178,12 @@ export class Client {
    * returns the same job.
    */
   async submitJob(request: JobRequest): Promise<Job> {
-    const key = randomKey();
-    for (let attempt = 1; ; attempt += 1) {
-      try {
-        return await this.connection.json<Job>('/v1/jobs', {
-          method: 'POST',
-          headers: { 'Content-Type': 'application/json', 'Idempotency-Key': key },
-          body: JSON.stringify(request),
-        });
-      } catch (error) {
-        if (attempt > submitRetries || !asApiError(error).isUnreachable) throw error;
-        await sleep(500 * attempt);
-      }
-    }
+    const { status, text, headers } = await this.connection.askAgain('/v1/jobs', {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', 'Idempotency-Key': randomKey() },
+      body: JSON.stringify(request),
+    });
+    return jsonOf(status, text, headers) as Job;
   }
 
   /**

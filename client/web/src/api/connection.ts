@@ -4,6 +4,8 @@ import { BusyPauses, checkedLimit, isBusy, usualLimit, type HeaderValues } from 
 import { ApiError, asApiError, errorOf, jsonOf } from './problem';
 import { sleep } from './sleep';
 
+const retries = 3;
+
 // The address without the slash at its end.
 function baseOf(server: string | undefined): string {
   const example = "new Client({ server: 'http://127.0.0.1:8080' })";
@@ -14,6 +16,19 @@ function baseOf(server: string | undefined): string {
     throw new TypeError(`The server's address must begin with http:// or https://, such as ${example}. It is "${server}".`);
   }
   return (server ?? '').replace(/\/+$/, '');
+}
+
+// A page is told no status of a redirect.
+function isRedirect({ status, type }: Response): boolean {
+  return type === 'opaqueredirect' || (status >= 300 && status < 400 && status !== 304);
+}
+
+function redirected(): ApiError {
+  return new ApiError(
+    -1,
+    'The server redirects to another address',
+    'Requests go to the named server only. Give the address that it redirects to. A proxy before it may ask for a login.',
+  );
 }
 
 // A response with its whole body.
@@ -51,7 +66,10 @@ export class Connection {
     this.token = new Signal(token);
   }
 
+  // Throws an ApiError if the path, which may come from a response, would lead to another server.
   addressOf(path: string): string {
+    // Browsers leave out tabs and line breaks: two slashes around one would be followed by a host.
+    if (!/^\/(?![/\\])[^\t\r\n]*$/.test(path)) throw new ApiError(-1, 'The response is not one of isomeshd', `It names the address ${JSON.stringify(path)}.`);
     return this.base + path;
   }
 
@@ -74,6 +92,19 @@ export class Connection {
     const response = await this.begin(path, init);
     const text = await this.received(response.text(), init);
     return { status: response.status, headers: response.headers, text };
+  }
+
+  // The same for a request that may be sent twice. It is sent again if the server cannot be reached or its response is lost.
+  async askAgain(path: string, init: Init): Promise<Answer> {
+    for (let attempt = 1; ; attempt += 1) {
+      try {
+        return await this.ask(path, init);
+      } catch (error) {
+        if (attempt > retries || !(error instanceof ApiError && error.isUnreachable)) throw error;
+      }
+      await sleep(500 * attempt, init.signal);
+      init.signal?.throwIfAborted();
+    }
   }
 
   // Returns the response before its body has come. Throws an ApiError for one with an error status.
@@ -111,8 +142,10 @@ export class Connection {
     const pauses = new BusyPauses(retrySeconds);
     for (;;) {
       const headers = this.headers(init.headers as Record<string, string>);
-      const response = await this.received(fetch(this.addressOf(path), { ...init, headers }), init);
+      // Volumes and tokens are for the named server only.
+      const response = await this.received(fetch(this.addressOf(path), { ...init, headers, redirect: 'manual' }), init);
       this.connected.value = true;
+      if (isRedirect(response)) throw redirected();
       if (response.status === 401) this.unauthorized.value = true;
       const seconds = isBusy(response.status) ? pauses.next(response.headers) : null;
       if (seconds === null) return response;

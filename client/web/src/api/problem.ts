@@ -65,6 +65,11 @@ export function errorOf(status: number, body: string, headers?: HeaderValues): A
   return new ApiError(status, `HTTP status ${status}`, detail, [], {}, null, headers && retryAfterOf(headers));
 }
 
+// For a response that lacks what the API says.
+export function notTheApi(): ApiError {
+  return new ApiError(-1, 'The response is not one of isomeshd', 'A proxy before the server may ask for a login.');
+}
+
 // The JSON of a response. Throws an ApiError for an error status, or if the body is not one of the API's.
 export function jsonOf(status: number, body: string, headers?: HeaderValues): unknown {
   if (!isSuccess(status)) throw errorOf(status, body, headers);

@@ -2,7 +2,7 @@
 // (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
 import { isBusy, partingLimit } from './busy';
 import type { Answer, Connection, Init } from './connection';
-import { ApiError, errorOf, isPassing, isSuccess } from './problem';
+import { ApiError, errorOf, isPassing, isSuccess, notTheApi } from './problem';
 import { sleep } from './sleep';
 
 interface Options {
@@ -15,6 +15,8 @@ interface Reached {
   offset: number;
   isWhole: boolean;
 }
+
+const places = '/v1/uploads/';
 
 // A part takes about a second, so that the progress is seen to move.
 const leastPart = 1 << 20;
@@ -38,7 +40,8 @@ async function assertReadable(bytes: Blob): Promise<void> {
   }
 }
 
-// Counts the time since the first failure after progress, and makes the pauses between retries longer.
+// Counts the time since the first failure after progress, and makes the pauses between retries longer. The time that a
+// busy server asked for is no outage.
 class Patience {
   private cut: number | null = null;
   private pause = firstPause;
@@ -50,6 +53,10 @@ class Patience {
 
   fail(): void {
     this.cut ??= Date.now();
+  }
+
+  excuse(seconds: number): void {
+    if (this.cut !== null) this.cut += 1000 * seconds;
   }
 
   isOver(): boolean {
@@ -115,7 +122,10 @@ class Parts {
     // The reason of a conflict is in the body of a GET.
     if (answer.status === 409) return this.ask(this.place, {});
     if (!isSuccess(answer.status)) return answer;
-    const offset = Number(answer.headers.get('Upload-Offset'));
+    const text = answer.headers.get('Upload-Offset') ?? '';
+    const offset = /^\d+$/.test(text) ? Number(text) : Infinity;
+    // A proxy that asks for a login may respond.
+    if (offset > this.whole.size) throw notTheApi();
     this.goTo({ offset, isWhole: answer.headers.get('Upload-Complete') === '?1' });
     return null;
   }
@@ -148,7 +158,11 @@ class Parts {
   }
 
   private ask(path: string, init: Init): Promise<Answer> {
-    const { signal, onBusy } = this.options;
+    const { signal } = this.options;
+    const onBusy = (seconds: number): void => {
+      this.patience.excuse(seconds);
+      this.options.onBusy?.(seconds);
+    };
     return this.connection.ask(path, { ...init, signal, onBusy });
   }
 
@@ -174,14 +188,16 @@ export async function answerInParts(
   options: Options,
 ): Promise<Answer> {
   const { signal, onBusy } = options;
-  const begun = await connection.ask(path, {
+  // An upload whose address is lost has no bytes, and expires.
+  const begun = await connection.askAgain(path, {
     method: 'POST',
     signal,
     onBusy,
     headers: { ...headers, 'Upload-Complete': '?0', 'Upload-Length': String(whole.size) },
   });
-  const place = begun.headers.get('Location');
-  if (!isSuccess(begun.status) || place === null) throw errorOf(begun.status, begun.text, begun.headers);
+  // A proxy may have made it absolute.
+  const place = begun.headers.get('Location')?.replace(/^https?:\/\/[^/]*/, '') ?? '';
+  if (!isSuccess(begun.status) || !place.startsWith(places)) throw errorOf(begun.status, begun.text, begun.headers);
   try {
     const answer = await new Parts(connection, path, place, whole, options).answer();
     if (answer.status !== 410) return answer;

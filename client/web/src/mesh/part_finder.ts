@@ -9,6 +9,24 @@ export interface PartSummary {
   volume: number; // mm3, of a closed part
   // A vertex of it.
   point: Vec3;
+  // The corners of the box around it.
+  low: Vec3;
+  high: Vec3;
+}
+
+// The numbers of these parts among those of the same surface that was found anew: blocks come in any order, and parts are numbered as
+// they come. Each is the one whose box is most like its own.
+export function foundAnew(parts: readonly PartSummary[], all: readonly PartSummary[]): number[] {
+  const unlike = (a: PartSummary, b: PartSummary): number =>
+    [...a.low, ...a.high].reduce((sum, value, at) => sum + Math.abs(value - ([...b.low, ...b.high][at] as number)), 0);
+  return parts.flatMap((part) => {
+    let [nearest, least] = [all[0], Infinity];
+    for (const one of all) {
+      const difference = unlike(part, one);
+      if (difference < least) [nearest, least] = [one, difference];
+    }
+    return nearest ? [nearest.number] : [];
+  });
 }
 
 type Drawn = Pick<Block, 'positions' | 'index' | 'border'>;
@@ -112,13 +130,20 @@ export class PartFinder {
       part.triangles += 1;
       part.area += Math.hypot(nx, ny, nz) / 2;
       part.volume += ((at(a, 0) - ox) * nx + (at(a, 1) - oy) * ny + (at(a, 2) - oz) * nz) / 6;
+      for (const vertex of [a, b, c]) {
+        for (const axis of [0, 1, 2] as const) {
+          const value = at(vertex, axis);
+          if (value < part.low[axis]) part.low[axis] = value;
+          if (value > part.high[axis]) part.high[axis] = value;
+        }
+      }
     }
   }
 
   private partFor(root: number, point: Vec3): PartSummary {
     const known = this.parts.get(root);
     if (known) return known;
-    const made = { number: this.parts.size, triangles: 0, area: 0, volume: 0, point };
+    const made: PartSummary = { number: this.parts.size, triangles: 0, area: 0, volume: 0, point, low: [...point], high: [...point] };
     this.parts.set(root, made);
     return made;
   }

@@ -20,7 +20,7 @@ export async function saveFile(href: string, name: string, bytes: number): Promi
     return;
   }
   const link = document.createElement('a');
-  link.href = href;
+  link.href = client.connection.addressOf(href);
   link.download = name;
   link.click();
 }

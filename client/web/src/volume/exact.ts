@@ -40,6 +40,7 @@ export class ExactSamples {
   private readonly slices = new Nearby<Samples>(mostKept);
   private readonly wanted = new Map<Axis, number>();
   private timer = 0;
+  private reading = 0;
 
   constructor(
     private readonly volume: Volume,
@@ -74,8 +75,12 @@ export class ExactSamples {
     });
   }
 
-  async read(axis: Axis, place: Vec3): Promise<number> {
-    return this.found(place) ?? valueIn(await this.get(axis, place[axisIndex(axis)]), axis, place);
+  // Null if another place was asked for meanwhile: an answer that comes late must not replace a later one.
+  async read(axis: Axis, place: Vec3): Promise<number | null> {
+    this.reading += 1;
+    const { reading } = this;
+    const value = this.found(place) ?? valueIn(await this.get(axis, place[axisIndex(axis)]), axis, place);
+    return reading === this.reading ? value : null;
   }
 
   // In any of the three slices through it.

@@ -33,8 +33,33 @@ function isText(head: Uint8Array): boolean {
   return /^NRRD|^\s*[A-Za-z]\w*\s*=|^(\u00ef\u00bb\u00bf)?\s*<(\?xml|VTKFile)/.test(textOf(head));
 }
 
+// Old ones have a checksum only.
+function isTar(head: Uint8Array): boolean {
+  if (textOf(head, 257, 5) === 'ustar') return true;
+  const sum = head.subarray(0, 512).reduce((total, byte, at) => total + (at >= 148 && at < 156 ? 32 : byte), 0);
+  return head[0] !== 0 && head.length >= 512 && Number.parseInt(textOf(head, 148, 8).trim(), 8) === sum;
+}
+
 function isArchive(head: Uint8Array): boolean {
-  return textOf(head, 0, 2) === 'PK' || textOf(head, 257, 5) === 'ustar';
+  return textOf(head, 0, 2) === 'PK' || isTar(head);
+}
+
+// The letters that tell the other formats, and where they are. Gaussian cube has none.
+const tellers: readonly (readonly [at: number, letters: string])[] = [
+  ...['II*\0', 'MM\0*', 'II+\0', 'MM\0+'].map((letters) => [0, letters] as const), // TIFF
+  [0, '\u0089HDF'],
+  [0, '\u0093NUMPY'],
+  [0, 'mrtrix image'],
+  [0, '# vtk DataFile'],
+  [0, 'CTDATA-HEADER'], // Scanco ISQ
+  [0, '\0\0\0\u0001\0'], // MGH: version 1 and a width below 2^24
+  [208, 'MAP'], // MRC
+  [252, '\u00ef\u00ff\u00e9\u00b0'], // GIPL
+  [252, '\u002a\u00e3\u0089\u00b8'],
+];
+
+function isTold(head: Uint8Array): boolean {
+  return tellers.some(([at, letters]) => textOf(head, at, letters.length) === letters) || /^#[^]*CLINICAL TRYOUT/.test(textOf(head)); // PAR/REC
 }
 
 // Compression other than gzip, which browsers cannot decompress.
@@ -68,7 +93,7 @@ async function unpacked(file: Blob): Promise<Uint8Array> {
 }
 
 function isKnown(head: Uint8Array): boolean {
-  return [isNifti, isDicom, isText, isArchive, isPackedOtherwise].some((test) => test(head));
+  return [isNifti, isDicom, isText, isArchive, isTold, isPackedOtherwise].some((test) => test(head));
 }
 
 // Formats whose first bytes are tested above, and raw samples, which need a description.
@@ -77,7 +102,7 @@ const suffixes = volumeFormats
   .filter(({ name }) => !sniffed.includes(name))
   .flatMap((format) => format.suffixes.map((suffix) => suffix.toLowerCase()));
 
-// The other formats are only known by the ends of their names.
+// A name is enough, also for a picture, which is a volume only among others.
 function isNamedAsVolume(path: string): boolean {
   const name = path.toLowerCase().replace(/\.gz$/, '');
   return suffixes.some((suffix) => name.endsWith(suffix.replace(/\.gz$/, '')));

@@ -149,15 +149,12 @@ class Comparison {
 
   private cellFor(job: Job, title: string): HTMLElement {
     const cell = new Cell(job, title);
-    finished(job.id, this.scope, (now) => cell.showProgress(now)).then(
-      (done) => {
-        // The cell has its place in the page by now.
-        if (!this.scope.isOver) void this.showResult(done, cell);
-      },
-      (error: unknown) => {
+    finished(job.id, this.scope, (now) => cell.showProgress(now))
+      // The cell has its place in the page by now.
+      .then((done) => (this.scope.isOver ? undefined : this.showResult(done, cell)))
+      .catch((error: unknown) => {
         if (!this.scope.isOver) cell.show(refusal(asApiError(error)));
-      },
-    );
+      });
     return cell.element;
   }
 

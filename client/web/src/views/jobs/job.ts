@@ -14,7 +14,7 @@ import { shortId } from '../../ui/format';
 import { refusal, tellError } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
-import { volumeName } from '../../volume/names';
+import { KnownVolumes } from '../../volume/known';
 import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings, titleOf } from './job_panel';
 import { SlicesBeside } from './job_slices';
 import { printCheck } from './print_check';
@@ -30,20 +30,22 @@ function stagesOf({ parameters }: Job): string[] {
   return stages.filter((name) => !isLeftOut[name]);
 }
 
-// The volume may be gone while its surface is still there.
-async function volumeOf(job: Job): Promise<Volume | null> {
-  try {
-    return await client.getVolume(job.volume);
-  } catch (error) {
-    if (asApiError(error).isUnreachable) throw error;
-    return null;
-  }
+// What the job was made of. The volume may be missing while its surface is still there.
+interface Source {
+  volume: Volume | null;
+  name: string;
 }
 
-function head(job: Job, volume: Volume | null): HTMLElement {
+async function sourceOf({ volume: id }: Job): Promise<Source> {
+  const volumes = new KnownVolumes();
+  await volumes.find([id]);
+  return { volume: volumes.get(id), name: volumes.nameOf(id) };
+}
+
+function head(job: Job, { volume, name }: Source): HTMLElement {
   return h('header.panel-head', [
     h('h1', titleOf(job)),
-    h('p.of-volume', volume ? volumeName(volume) : 'The volume was erased'),
+    h('p.of-volume', name),
     h('p', inWords(job.parameters)),
     h('p.links', [
       volume && h('a', { href: changeLink(job) }, 'Change parameters'),
@@ -100,13 +102,14 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   // While the daemon is asked.
   surfaceDrawing().catch(() => undefined);
   const first = await client.getJob(route.path[1] ?? '');
-  const volume = await volumeOf(first);
+  const source = await sourceOf(first);
+  const { volume } = source;
   const stageArea = h('div.stage-area');
   const panel = h('aside.panel', { 'aria-label': 'Job' });
   const element = h('div.job', { 'data-state': first.state }, stageArea, panel);
 
   // A tab in the background says how far its job is.
-  const name = [titleOf(first), volume && volumeName(volume)].filter(Boolean).join(', ');
+  const name = [titleOf(first), volume && source.name].filter(Boolean).join(', ');
   const nameTab = (job: Job): void => {
     const far = job.state === 'succeeded' ? '' : job.state === 'running' ? `${Math.round(100 * job.progress)} %: ` : `${job.state}: `;
     element.dataset.title = far + name;
@@ -116,9 +119,9 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const showEnd = async (job: Job): Promise<void> => {
     element.dataset.state = job.state;
     nameTab(job);
-    if (job.state !== 'succeeded' || !job.mesh) return showFailure(job, volume, stageArea, panel);
+    if (job.state !== 'succeeded' || !job.mesh) return showFailure(job, source, stageArea, panel);
     const labels = await labelsOfMesh(job);
-    if (!scope.isOver) showSurface(scope, route, job, new LabelState(labels, volume !== null && volume !== undefined && isRenumbered(volume)), volume, stageArea, panel);
+    if (!scope.isOver) showSurface(scope, route, job, new LabelState(labels, volume !== null && isRenumbered(volume)), source, stageArea, panel);
   };
   if (isFinal(first.state)) {
     await showEnd(first);
@@ -128,7 +131,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const progress = new ProgressPanel(first);
   progress.show(first);
   stageArea.append(h('div.waiting', h('p', 'The surface appears here when it is ready.')));
-  panel.append(head(first, volume), progress.element);
+  panel.append(head(first, source), progress.element);
   client.follow(first.id, scope.signal, (job) => {
     element.dataset.state = job.state;
     nameTab(job);
@@ -138,18 +141,18 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
       if (!scope.isOver) await showEnd(job);
     })
     .catch((error: unknown) => {
-      if (!scope.isOver) panel.replaceChildren(head(first, volume), refusal(asApiError(error)));
+      if (!scope.isOver) panel.replaceChildren(head(first, source), refusal(asApiError(error)));
     });
   return element;
 }
 
-function showFailure(job: Job, volume: Volume | null, stageArea: HTMLElement, panel: HTMLElement): void {
+function showFailure(job: Job, source: Source, stageArea: HTMLElement, panel: HTMLElement): void {
   const change = h('a.button.primary', { href: changeLink(job) }, 'Change parameters');
   const body = job.error
     ? refusal(errorOfProblem(job.error), change)
     : h('div.refusal', h('h2', 'Cancelled'), h('p', 'The job was cancelled and made no surface.'), h('div.actions', change));
   stageArea.replaceChildren(h('div.waiting', body));
-  panel.replaceChildren(head(job, volume), timings(job));
+  panel.replaceChildren(head(job, source), timings(job));
 }
 
 function showSurface(
@@ -157,11 +160,12 @@ function showSurface(
   route: Route,
   job: Job,
   labels: LabelState,
-  volume: Volume | null,
+  source: Source,
   stageArea: HTMLElement,
   panel: HTMLElement,
 ): void {
   const { mesh } = job;
+  const { volume } = source;
   if (!mesh) return;
   const camera = placeOfText(route.query.get('cam') ?? '');
   const slices = volume && new SlicesBeside(scope, job, volume, labels, stageArea, route.query);
@@ -175,7 +179,7 @@ function showSurface(
   const times = timings(job);
   const check = printCheck(job, (places) => pane.mark(places));
   panel.replaceChildren(
-    head(job, volume),
+    head(job, source),
     ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
     check ? section('Before you print', check) : '',
     section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),

@@ -11,13 +11,29 @@ const states = ['queued', 'running', 'succeeded', 'failed', 'cancelled'] as cons
 const orders = { '': 'Queue, then newest', oldest: 'Oldest', longest: 'Longest time', largest: 'Most triangles' } as const;
 type Order = keyof typeof orders;
 const names = ['state', 'since', 'until', 'volume', 'search', 'sort'] as const;
-const oneDay = 86_400_000;
 
 const by: Record<Exclude<Order, ''>, (a: Job, b: Job) => number> = {
   oldest: (a, b) => (a.id < b.id ? -1 : 1),
   longest: (a, b) => (b.timing.total ?? 0) - (a.timing.total ?? 0),
   largest: (a, b) => (b.mesh?.triangles ?? 0) - (a.mesh?.triangles ?? 0),
 };
+
+// The server can be asked for these and what is between.
+const [firstInstant, lastInstant] = ['0000-01-01T00:00:00Z', '9999-12-31T23:59:59Z'] as const;
+
+// When that day begins on the person's clock, which the list's times are of. Undefined for no day.
+export function beginOf(day: string | undefined, daysLater = 0): string | undefined {
+  const [, year, month, date] = /^(\d{4,6})-(\d\d)-(\d\d)$/.exec(day ?? '') ?? [];
+  if (year === undefined) return undefined;
+  const begin = new Date(2000, 0);
+  // The constructor of Date would take years below 100 for those of the last century.
+  begin.setFullYear(Number(year), Number(month) - 1, Number(date) + daysLater);
+  if (Number.isNaN(begin.getTime())) return undefined;
+  const instant = begin.toISOString().replace('.000Z', 'Z');
+  // Years that four digits cannot write have a sign.
+  if (instant.startsWith('+')) return lastInstant;
+  return instant.startsWith('-') ? firstInstant : instant;
+}
 
 export class JobFilter implements JobSource {
   readonly element: HTMLElement;
@@ -56,10 +72,9 @@ export class JobFilter implements JobSource {
     const { values } = this;
     const own = (values.state || undefined) as JobState | undefined;
     if (own && state && own !== state) return { jobs: [], next: null };
-    const last = Date.parse(values.until ?? '');
-    // The day itself, too.
-    const until = Number.isNaN(last) ? undefined : new Date(last + oneDay).toISOString().slice(0, 10);
-    return client.listJobs(cursor, { state: state ?? own, limit, volume: values.volume, since: values.since, until });
+    // The last day itself, too.
+    const days = { since: beginOf(values.since), until: beginOf(values.until, 1) };
+    return client.listJobs(cursor, { state: state ?? own, limit, volume: values.volume, ...days });
   }
 
   // Those that are searched for, in the order that is chosen.

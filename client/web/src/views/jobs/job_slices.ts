@@ -9,6 +9,7 @@ import { Scope } from '../../ui/signal';
 import { cssColour } from '../../ui/theme';
 import { cursorOfText, sampleAt } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
+import { Once } from '../../volume/once';
 import { SliceSource } from '../../volume/slices';
 import type { SurfacePane } from '../surface/surface_pane';
 import { SliceView, type SliceHost } from '../slices/slice_view';
@@ -21,7 +22,7 @@ class JobSlices {
   onCursor: ((cursor: Vec3) => void) | null = null;
   cursor: Vec3;
   private views: SliceView[] = [];
-  private places: Promise<VolumeLabels> | null = null;
+  private readonly places = new Once<VolumeLabels>();
 
   constructor(
     private readonly volume: Volume,
@@ -72,8 +73,8 @@ class JobSlices {
   }
 
   async goToLabel(label: Label, background: number): Promise<void> {
-    this.places ??= client.labelsOf(this.volume.id, background);
-    const found = (await this.places).labels.find((one) => one.label === label);
+    const { labels } = await this.places.get(String(background), () => client.labelsOf(this.volume.id, background));
+    const found = labels.find((one) => one.label === label);
     if (found) this.goTo(middleOf(found));
   }
 

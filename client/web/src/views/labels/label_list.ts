@@ -5,7 +5,7 @@ import { holdsAllLabels, meshFormats } from '../../job/table';
 import { fileNameOf, makeVariant, saveVariant } from '../../job/variants';
 import { button, checkbox, h, select } from '../../ui/dom';
 import { formatCount, formatValue, meshFileSuffix, meshFormatTitle } from '../../ui/format';
-import { tellError } from '../../ui/notices';
+import { tell, tellError } from '../../ui/notices';
 import { saveBlob, saveFile } from '../../ui/save';
 import type { Scope } from '../../ui/signal';
 import { opacityControl } from './label_opacity';
@@ -21,6 +21,8 @@ export function volumeText({ closed, oriented, volume_mm3: volume }: LabelSummar
 export function areaText({ area_mm2: area }: LabelSummary): string {
   return `${formatValue(area)} mm\u00b2`;
 }
+
+const noneShown = 'No label is shown. Show those that you want.';
 
 interface Row {
   element: HTMLElement;
@@ -61,11 +63,12 @@ export class LabelList {
         this.saveAs('Save what is shown as', (format) => {
           const file = state.hidden.value.size === 0 ? job.mesh?.files[format] : undefined;
           const [only, ...others] = labels.filter(({ label }) => state.isShown(label));
+          if (!only) return tell(noneShown);
           if (file) void saveFile(file.href, fileNameOf(job, volume, `.${meshFileSuffix(format)}`), file.bytes).catch(tellError);
-          else if (only && others.length === 0) this.saveLabel(only, format);
-          else void saveVariant(job, volume, format, this.shown);
+          else if (others.length === 0) this.saveLabel(only, format);
+          else void saveVariant(job, volume, format, this.shown ?? {});
         }),
-        button('Make what is shown', () => makeVariant(job)(this.shown), { title: 'Starts a job of the labels that are shown, in all its formats' }),
+        button('Make what is shown', () => (this.shown ? makeVariant(job)(this.shown) : tell(noneShown)), { title: 'Starts a job of the labels that are shown, in all its formats' }),
         button('Save as CSV', () => this.saveTable(), { title: 'Saves a table of all labels: voxels, volumes, areas, components' }),
       ]),
     ]);
@@ -76,10 +79,11 @@ export class LabelList {
     scope.onEnd(state.picked.subscribe((picked) => this.markPicked(picked)));
   }
 
-  // The changes that make a job one of the labels that are shown; none where all are.
-  private get shown(): Partial<JobParameters> {
+  // The changes that make a job one of the labels that are shown; none where all are. Null: no label is shown.
+  private get shown(): Partial<JobParameters> | null {
     const [first, ...others] = this.state.labels.map(({ label }) => label).filter((label) => this.state.isShown(label));
-    return first === undefined || this.state.hidden.value.size === 0 ? {} : { labels: [first, ...others] };
+    if (first === undefined) return null;
+    return others.length + 1 === this.state.labels.length ? {} : { labels: [first, ...others] };
   }
 
   private rowOf(label: LabelSummary): Row {

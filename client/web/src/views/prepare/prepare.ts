@@ -424,7 +424,8 @@ class Prepare {
     this.problem.replaceChildren();
     try {
       const job = await client.submitJob(jobRequest(this.parameters));
-      go(['jobs', job.id]);
+      // Whoever went elsewhere meanwhile is told when it has ended.
+      if (!this.scope.isOver) go(['jobs', job.id]);
     } catch (error) {
       const failure = asApiError(error);
       this.problem.replaceChildren(refusal(failure, failure.isUnreachable && button('Try again', () => void this.start())));

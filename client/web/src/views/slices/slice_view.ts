@@ -366,7 +366,12 @@ export class SliceView {
     const { canvas, scope } = this;
     const take = (place: Vec3 | null): void => {
       if (!place || this.host.state().labels) return;
-      this.host.source.exact.read(this.layout.normal, place).then(this.host.setIso, (error: unknown) => this.host.onError(error));
+      this.host.source.exact.read(this.layout.normal, place).then(
+        (value) => {
+          if (value !== null) this.host.setIso(value);
+        },
+        (error: unknown) => this.host.onError(error),
+      );
     };
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
       if (event.pointerType === 'mouse') this.readout.point(this.sampleAt(event), this.host.state().cursor);

@@ -1,5 +1,6 @@
 // The connected components of a surface: a list with their sizes and places, to show and hide them at once, and one job of what is shown.
 import type { Job, JobParameters, Vec3 } from '../../api/types';
+import { HiddenParts } from '../../mesh/hidden_parts';
 import type { PartFinder, PartSummary } from '../../mesh/part_finder';
 import type { Picked } from '../../scene/picked';
 import type { Surface } from '../../scene/surface';
@@ -31,9 +32,7 @@ export class ComponentList {
   readonly picked = h('div.picked-part', { role: 'status', hidden: true });
   private readonly body = h('div', h('p.hint', { role: 'status' }, 'Looking for connected components'));
   private readonly rows = new Map<number, HTMLElement>();
-  private readonly hidden = new Set<number>();
-  // The largest first.
-  private all: readonly PartSummary[] = [];
+  private readonly parts = new HiddenParts();
   private readonly summary = h('p.hint', { role: 'status' });
   private readonly make: HTMLButtonElement;
   private surface: Surface | null = null;
@@ -46,7 +45,7 @@ export class ComponentList {
     makeVariant: MakeVariant,
   ) {
     const count = job.mesh?.components ?? 1;
-    this.make = button('Make what is shown', () => makeVariant(keepOnlyAt(...this.shown.map(({ point }) => point))), {
+    this.make = button('Make what is shown', () => makeVariant(keepOnlyAt(...this.parts.shown.map(({ point }) => point))), {
       title: 'Starts one job that drops all components that are hidden',
     });
     const isList = count > 1 && !isByLabels(job.parameters);
@@ -57,10 +56,11 @@ export class ComponentList {
   // All of the surface is there.
   loaded(surface: Surface): void {
     this.surface = surface;
-    // Other triangles at the same places.
+    // Other triangles at the same places, whose components have other numbers.
     this.finding = null;
-    if (this.hidden.size > 0) void this.find().then(() => surface.components.setHidden(this.hidden));
-    else if (this.element?.open) void this.find();
+    this.parts.lose();
+    this.picked.hidden = true;
+    if (this.parts.numbers.size > 0 || this.element?.open) void this.find();
   }
 
   // Null for nowhere.
@@ -74,16 +74,12 @@ export class ComponentList {
     const part = (await this.find())?.partOf(...vertex);
     if (!part || asked !== this.asked) return;
     this.picked.replaceChildren(
-      h('span', `One of ${formatCount(this.all.length)} connected components: ${this.sizeOf(part)}`),
+      h('span', `One of ${formatCount(this.parts.all.length)} connected components: ${this.sizeOf(part)}`),
       button('Show only this component', () => this.show((one) => one.number === part.number), { class: 'link' }),
-      button('Hide this component', () => this.show((one) => one.number !== part.number && !this.hidden.has(one.number)), { class: 'link' }),
+      button('Hide this component', () => this.show((one) => one.number !== part.number && !this.parts.numbers.has(one.number)), { class: 'link' }),
     );
     for (const [number, row] of this.rows) row.toggleAttribute('aria-current', number === part.number);
     this.rows.get(part.number)?.setAttribute('aria-current', 'true');
-  }
-
-  private get shown(): PartSummary[] {
-    return this.all.filter(({ number }) => !this.hidden.has(number));
   }
 
   private sizeOf({ volume, area, triangles }: PartSummary): string {
@@ -98,6 +94,11 @@ export class ComponentList {
     this.finding ??= new Promise((resolve) => {
       const step = (): void => {
         if (this.scope.isOver) return;
+        // Another surface came meanwhile.
+        if (finder !== this.surface?.components.finder) {
+          resolve(null);
+          return;
+        }
         const until = performance.now() + slice;
         while (performance.now() < until) {
           if (finder.step()) continue;
@@ -113,15 +114,18 @@ export class ComponentList {
   }
 
   private fill(all: readonly PartSummary[]): void {
-    this.all = [...all].sort((a, b) => b.area - a.area);
+    const { parts } = this;
+    const wereHidden = parts.numbers.size > 0;
+    parts.take(all);
+    if (wereHidden) this.surface?.components.setHidden(parts.numbers);
     this.rows.clear();
-    const listed = this.all.slice(0, mostRows);
+    const listed = parts.all.slice(0, mostRows);
     for (const part of listed) this.rows.set(part.number, this.rowOf(part));
-    const others = this.all.length - listed.length;
+    const others = parts.all.length - listed.length;
     this.body.replaceChildren(
       h('div.label-tools', [
         button('All', () => this.show(() => true)),
-        button('Largest only', () => this.show((part) => part === this.all[0])),
+        button('Largest only', () => this.show((part) => part === parts.all[0])),
         others > 0 && button('Listed only', () => this.show(({ number }) => this.rows.has(number)), { title: `Hides ${formatCount(others)} smaller components` }),
         this.make,
       ]),
@@ -136,12 +140,13 @@ export class ComponentList {
     const check = checkbox(
       `${this.sizeOf(part)}; at ${at} mm`,
       true,
-      (isOn) => this.show(({ number }) => (number === part.number ? isOn : !this.hidden.has(number))),
+      (isOn) => this.show(({ number }) => (number === part.number ? isOn : !this.parts.numbers.has(number))),
     );
     const row = h('li', check);
     const mark = (isOn: boolean) => () => {
       const { surface } = this;
-      surface?.change(() => surface.components.mark(isOn && !this.hidden.has(part.number) ? part.number : null));
+      if (!this.parts.areFound) return;
+      surface?.change(() => surface.components.mark(isOn && !this.parts.numbers.has(part.number) ? part.number : null));
     };
     for (const name of ['pointerenter', 'focusin']) row.addEventListener(name, mark(true));
     for (const name of ['pointerleave', 'focusout']) row.addEventListener(name, mark(false));
@@ -149,26 +154,27 @@ export class ComponentList {
   }
 
   private show(isShown: (part: PartSummary) => boolean): void {
-    const hidden = this.all.filter((part) => !isShown(part)); // before any is forgotten
-    this.hidden.clear();
-    for (const { number } of hidden) this.hidden.add(number);
+    this.parts.show(isShown);
     const { surface } = this;
-    surface?.change(() => {
-      surface.components.mark(null);
-      surface.components.setHidden(this.hidden);
-    });
+    // Until the components are found their numbers say nothing about what is drawn.
+    if (this.parts.areFound) {
+      surface?.change(() => {
+        surface.components.mark(null);
+        surface.components.setHidden(this.parts.numbers);
+      });
+    }
     this.update();
   }
 
   private update(): void {
     for (const [number, row] of this.rows) {
       const input = row.querySelector('input');
-      if (input) input.checked = !this.hidden.has(number);
+      if (input) input.checked = !this.parts.numbers.has(number);
     }
-    const count = this.all.length - this.hidden.size;
-    this.make.disabled = count === 0 || this.hidden.size === 0 || count > mostPlaces;
-    const tooMany = this.hidden.size > 0 && count > mostPlaces ? `; a job keeps at most ${formatCount(mostPlaces)}` : '';
-    const cut = this.all.length > mostRows ? `; the largest ${formatCount(mostRows)} are listed` : '';
-    this.summary.textContent = `${formatCount(count)} of ${formatCount(this.all.length)} are shown${cut}${tooMany}`;
+    const count = this.parts.all.length - this.parts.numbers.size;
+    this.make.disabled = count === 0 || this.parts.numbers.size === 0 || count > mostPlaces;
+    const tooMany = this.parts.numbers.size > 0 && count > mostPlaces ? `; a job keeps at most ${formatCount(mostPlaces)}` : '';
+    const cut = this.parts.all.length > mostRows ? `; the largest ${formatCount(mostRows)} are listed` : '';
+    this.summary.textContent = `${formatCount(count)} of ${formatCount(this.parts.all.length)} are shown${cut}${tooMany}`;
   }
 }

@@ -13,6 +13,7 @@ import { defaultWindow } from '../../volume/histogram';
 import type { LabelLook, NumberedSlice } from '../../volume/label_map';
 import { SliceSource, type Window } from '../../volume/slices';
 import { labelImage, labelOpacity } from '../labels/label_opacity';
+import { CutPictures } from './cut_pictures';
 import { FreeCut } from './free_cut';
 
 const bins = 512;
@@ -42,8 +43,7 @@ export class CutTool {
   // Axial first: what most people think of as a slice.
   private readonly axes: [Axis, string][];
   private window: Window | null = null;
-  private pictureWanted = '';
-  private isFetching = false;
+  private readonly pictures: CutPictures<{ picture: ImageBitmap; direction: Axis | 'free' }>;
   private readonly source: SliceSource;
   private paintings = 0;
 
@@ -65,6 +65,21 @@ export class CutTool {
     this.index = this.middle;
     this.source = new SliceSource(volume, scope);
     this.free = new FreeCut(volume, scope.signal);
+    this.pictures = new CutPictures(scope, {
+      fetch: async () => {
+        const { direction } = this;
+        return { direction, picture: await this.picture() };
+      },
+      onPicture: ({ picture, direction }, place) => {
+        if (scope.isOver || !this.isOn || direction !== this.direction) picture.close();
+        else this.showPicture(picture, place);
+      },
+      onError: (error) => {
+        // That of the place before would be taken for this one's.
+        this.showPicture(null);
+        tellError(error);
+      },
+    });
     // Labels are painted anew where others are seen, or the same ones otherwise.
     if (labels.labels.length > 0) {
       for (const changed of [labels.hidden, labels.colours, labelOpacity]) scope.onEnd(changed.subscribe(() => this.repaint()));
@@ -91,7 +106,7 @@ export class CutTool {
     this.element.hidden = !isOn;
     this.surface.setCut(isOn);
     if (!isOn) {
-      this.pictureWanted = '';
+      this.pictures.want('');
       this.surface.cut.show(null);
       delete this.view.dataset.slice;
       this.onChange?.('');
@@ -106,14 +121,19 @@ export class CutTool {
     return this.volume.dims[axisIndex(this.axis)];
   }
 
+  private get direction(): Axis | 'free' {
+    return this.isFree ? 'free' : this.axis;
+  }
+
   private get middle(): number {
     return Math.floor(this.count / 2);
   }
 
   private showControls(): void {
     const directions: [Axis | 'free', string][] = [...this.axes, ['free', 'Free']];
-    const shown = this.isFree ? 'free' : this.axis;
     const take = (direction: Axis | 'free'): void => {
+      // A picture along one direction is never shown along another.
+      this.surface.cut.show(null);
       this.isFree = direction === 'free';
       if (direction === 'free') {
         this.free.faceView(this.surface);
@@ -125,7 +145,7 @@ export class CutTool {
       this.place();
       if (!this.isFree) this.surface.faceCut();
     };
-    const choice = select(directions, shown, take, { 'aria-label': 'Direction of the cut' });
+    const choice = select(directions, this.direction, take, { 'aria-label': 'Direction of the cut' });
     this.element.replaceChildren(choice, ...(this.isFree ? this.freeControls() : this.sliceControls()));
   }
 
@@ -170,9 +190,8 @@ export class CutTool {
     if (this.isFree) this.free.place(this.surface);
     else this.surface.cut.place(this.volume, { axis, index, flipped });
     this.surface.draw();
-    this.pictureWanted = this.wanted;
     this.onChange?.(this.isFree ? this.free.text : `${axis}${index}${flipped ? '-' : '+'}`);
-    void this.fetchPicture();
+    this.pictures.want(this.wanted);
   }
 
   private get wanted(): string {
@@ -182,9 +201,7 @@ export class CutTool {
 
   private repaint(): void {
     this.paintings += 1;
-    if (!this.isOn) return;
-    this.pictureWanted = this.wanted;
-    void this.fetchPicture();
+    if (this.isOn) this.pictures.want(this.wanted);
   }
 
   private async picture(): Promise<ImageBitmap> {
@@ -207,26 +224,10 @@ export class CutTool {
     return createImageBitmap(await client.slicePicture(volume.id, axis, index, this.window, this.scope.signal));
   }
 
-  // One request at a time; the place that is wanted last is the next.
-  private async fetchPicture(): Promise<void> {
-    if (this.isFetching) return;
-    this.isFetching = true;
-    try {
-      let shown = '';
-      while (this.pictureWanted !== '' && this.pictureWanted !== shown && !this.scope.isOver) {
-        shown = this.pictureWanted;
-        const picture = await this.picture();
-        if (this.scope.isOver || !this.isOn) picture.close();
-        else {
-          this.surface.cut.show(picture);
-          this.view.dataset.slice = shown;
-          this.surface.draw();
-        }
-      }
-    } catch (error) {
-      if (!this.scope.isOver) tellError(error);
-    } finally {
-      this.isFetching = false;
-    }
+  private showPicture(picture: ImageBitmap | null, place = ''): void {
+    this.surface.cut.show(picture);
+    if (picture) this.view.dataset.slice = place;
+    else delete this.view.dataset.slice;
+    this.surface.draw();
   }
 }

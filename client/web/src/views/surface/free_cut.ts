@@ -4,6 +4,7 @@ import type { Surface } from '../../scene/surface';
 import { dot, opposite, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
 import { spanOf } from '../../volume/oblique';
+import { Once } from '../../volume/once';
 import { fetchLabelPreview, fetchPreview, largestPreview } from '../../volume/preview_file';
 import type { Preview } from '../../volume/preview';
 import { sampledSquare, type Resliced, type Square } from '../../volume/reslice';
@@ -14,7 +15,7 @@ const pixels = 384;
 export class FreeCut {
   // Points to what stays.
   private normal: Vec3 = [0, 1, 0];
-  private preview: { key: string; made: Promise<Preview> } | null = null;
+  private readonly preview = new Once<Preview>();
   // In millimetres from the volume's middle, along the normal.
   depth = 0;
 
@@ -78,11 +79,9 @@ export class FreeCut {
   // Over that window, or the numbers of labels.
   async picture(window: Window, look: LabelLook | null): Promise<Resliced> {
     const { signal, volume } = this;
-    const key = look ? look.map.key : window.join();
-    if (this.preview?.key !== key) {
-      const made = look ? fetchLabelPreview(volume.id, look.map, signal) : fetchPreview(volume.id, largestPreview, window, signal);
-      this.preview = { key, made };
-    }
-    return sampledSquare(await this.preview.made, this.square, look !== null);
+    const preview = await this.preview.get(look ? look.map.key : window.join(), () =>
+      look ? fetchLabelPreview(volume.id, look.map, signal) : fetchPreview(volume.id, largestPreview, window, signal),
+    );
+    return sampledSquare(preview, this.square, look !== null);
   }
 }

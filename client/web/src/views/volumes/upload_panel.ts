@@ -83,7 +83,13 @@ export class UploadPanel {
     if (text === null) return;
     const { name, kept, stored } = JSON.parse(text) as Left;
     const volumes = new KnownVolumes();
-    await volumes.find(stored.map(([, id]) => id));
+    try {
+      await volumes.find(stored.map(([, id]) => id));
+    } catch (error) {
+      // Nobody answered: the next visit of the list offers it.
+      this.left = text;
+      throw error;
+    }
     const read = stored.map(([series, id]) => [series, volumes.get(id)] as const).filter((one): one is [string, Volume] => one[1] !== null);
     if (this.running) return;
     this.isRestoring = true;
@@ -305,7 +311,7 @@ export class UploadPanel {
       this.showRest(rest);
       return;
     }
-    sessionStorage.removeItem(leftKey);
+    if (this.left === null) sessionStorage.removeItem(leftKey);
     this.body.replaceChildren(
       icon(arrow),
       h('h2', 'Drop a volume here'),
