@@ -67,7 +67,7 @@ struct isomesh_made {
   const std::uint8_t* colors;
   std::uint64_t vertex_count;
   std::uint64_t triangle_count;
-  const char* job;    // JSON, as a record of the server
+  const char* job;    // JSON, as the API tells it, in full
   const char* error;  // the sentence, or null
   const char* kind;   // of the error: the end of a problem's type
 };
@@ -241,7 +241,7 @@ class Run {
     job.parameters = std::move(parameters);
     job.timing = progress.timing();
     job.mesh = std::move(made.summary);
-    job_ = to_record(job);
+    job_ = to_full_json(job);
   }
 
   Volume volume_of() const {

@@ -53,12 +53,44 @@ class Failure(Exception):
         self.problem = {"type": kind, "title": title, "status": status, "detail": detail}
 
 
+class NoRedirects(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_):
+        return None
+
+
+# Tokens are for the daemon only: not for a proxy of the environment, nor for where a response leads.
+DIRECTLY = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirects)
+
+
+def failure_of(error, missing):
+    """What this service says of a daemon's error."""
+    with error:
+        try:
+            said = json.loads(error.read()) if PROBLEM in error.headers.get("Content-Type", "") else {}
+        except (OSError, ValueError, http.client.HTTPException):
+            said = {}  # the status is known, at least
+    if error.code < 400:
+        return Failure(502, "The daemon does not respond as one", f"It leads to another address (status {error.code}).")
+    problem = said if isinstance(said, dict) else {}
+    kind = missing if error.code == 404 and missing else problem.get("type", "about:blank")
+    kept = {name: error.headers[name] for name in ("WWW-Authenticate", "Retry-After") if name in error.headers}
+    return Failure(error.code, problem.get("title", error.reason), problem.get("detail", ""), kind, kept)
+
+
 def description():
     inputs = {
         name: {"title": name, "description": text, "schema": schema, "minOccurs": least, "maxOccurs": 1}
         for name, (text, schema, least) in INPUTS.items()
     }
     return {**SUMMARY, "inputs": inputs, "outputs": {"mesh": MESH}, "links": []}
+
+
+def host_of(authority):
+    """The name before a port; None without one, and for what is no authority, such as `[`."""
+    try:
+        return urllib.parse.urlsplit("//" + authority).hostname
+    except ValueError:
+        return None
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -90,7 +122,7 @@ class Handler(BaseHTTPRequestHandler):
     def _answer(self, routes):
         try:
             # A name that a stranger's DNS leads to this machine.
-            if urllib.parse.urlsplit("//" + self.headers.get("Host", "")).hostname not in self.server.names:
+            if host_of(self.headers.get("Host", "")) not in self.server.names:
                 raise Failure(421, "Unknown host", "Start the service with --url ADDRESS if clients know it by another name.")
             # An unread body would be taken for the next request.
             if "Transfer-Encoding" in self.headers or (self.command != "POST" and self.headers.get("Content-Length", "0") != "0"):
@@ -127,14 +159,13 @@ class Handler(BaseHTTPRequestHandler):
         body = None if value is None else json.dumps(value).encode()
         request = urllib.request.Request(self.server.daemon + path, body, headers, method=method)
         try:
-            with urllib.request.urlopen(request, timeout=TIMEOUT) as response:
-                return json.load(response)
+            with DIRECTLY.open(request, timeout=TIMEOUT) as response:
+                answer = json.load(response)
+            if not isinstance(answer, dict):
+                raise ValueError("its JSON is no object")
+            return answer
         except urllib.error.HTTPError as error:
-            with error:
-                problem = json.loads(error.read() or b"{}") if PROBLEM in error.headers.get("Content-Type", "") else {}
-            kind = missing if error.code == 404 and missing else problem.get("type", "about:blank")
-            kept = {name: error.headers[name] for name in ("WWW-Authenticate", "Retry-After") if name in error.headers}
-            raise Failure(error.code, problem.get("title", error.reason), problem.get("detail", ""), kind, kept) from None
+            raise failure_of(error, missing) from None
         except (OSError, ValueError, http.client.HTTPException) as error:
             raise Failure(502, "The daemon does not respond as one", str(error)) from None
 

@@ -3,6 +3,7 @@
 A script for Orthanc's Python plugin. It needs nothing but Python's standard library. README.md says how it is installed.
 """
 
+import http.client
 import json
 import pathlib
 import re
@@ -47,6 +48,15 @@ def checked(configuration):
     return configuration
 
 
+class NoRedirects(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_):
+        return None
+
+
+# The token is for isomesh only: not for a proxy of the environment, nor for where a response leads.
+DIRECTLY = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirects)
+
+
 def ask(method, path, body=None):
     """What isomesh answers. Raises Failure with its reason."""
     headers = {"Content-Type": "application/json"} if body is not None else {}
@@ -55,16 +65,16 @@ def ask(method, path, body=None):
     data = None if body is None else json.dumps(body).encode()
     request = urllib.request.Request(CONFIGURATION["Url"].rstrip("/") + path, data, headers, method=method)
     try:
-        with urllib.request.urlopen(request, timeout=TIMEOUT_S) as response:
+        with DIRECTLY.open(request, timeout=TIMEOUT_S) as response:
             return json.loads(response.read(MOST_BYTES))
     except urllib.error.HTTPError as error:
         try:
             detail = str(json.loads(error.read(MOST_BYTES))["detail"])
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, http.client.HTTPException):
             detail = f"isomesh answered with status {error.code}"
-        # The browser is logged in at Orthanc. It is Orthanc that isomesh does not let in.
-        raise Failure(502 if error.code in (401, 403) else error.code, detail) from None
-    except (OSError, ValueError) as error:
+        # The browser is logged in at Orthanc. It is Orthanc that isomesh does not let in, or leads elsewhere.
+        raise Failure(502 if error.code in (401, 403) or error.code < 400 else error.code, detail) from None
+    except (OSError, ValueError, http.client.HTTPException) as error:
         raise Failure(502, f"isomesh gave no answer: {getattr(error, 'reason', error)}") from None
 
 

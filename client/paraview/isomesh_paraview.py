@@ -1,7 +1,8 @@
 """ParaView: a reader and a filter that get surfaces from an isomesh daemon.
 
 A plugin of one file: Tools, Manage Plugins, Load New. It needs the package isomesh_client in ParaView's Python, or beside it in a checkout.
-The token is ISOMESH_TOKEN of the environment, because properties are written to state files.
+The token is ISOMESH_TOKEN of the environment, because properties are written to state files. It goes to the server of ISOMESH_SERVER
+only, because a state file of somebody else may name another one.
 """
 
 import importlib.util
@@ -24,6 +25,7 @@ if importlib.util.find_spec("isomesh_client") is None:
 import isomesh_client  # noqa: E402
 
 SERVER = os.environ.get("ISOMESH_SERVER", "http://127.0.0.1:8080")
+TOKEN = os.environ.get("ISOMESH_TOKEN", "")
 FILES = "nii nii.gz nrrd nhdr mha mhd mgz mgh dcm"
 
 
@@ -100,7 +102,8 @@ class Surface(VTKPythonAlgorithmBase):
         return 1
 
     def made(self, key, upload):
-        client = isomesh_client.Client(self._server)
+        is_own = self._server.rstrip("/") == SERVER.rstrip("/")
+        client = isomesh_client.Client(self._server, token=TOKEN if is_own else "")
         parameters = self.parameters()
         if self._stored[0] == key:
             try:

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/text.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/options.h"
 #include "client/platforms/descriptions.h"
@@ -40,6 +41,14 @@ std::vector<ToolOption> options_of(const CLI::App& local) {
   return options;
 }
 
+// The name stands in the descriptions as it is, some of which are programs.
+std::string wrong_image(const std::string& image) {
+  const auto is_of_name = [](char c) { return is_plain(c) || c == '/' || c == ':' || c == '@'; };
+  const bool is_name =
+      !image.empty() && is_letter_or_digit(image.front()) && std::ranges::all_of(image, is_of_name);
+  return is_name ? "" : '"' + image + "\" is not the name of an image, such as isomesh:1";
+}
+
 std::string titles() {
   std::string text;
   for (const Platform& platform : kPlatforms) {
@@ -71,6 +80,7 @@ Added platform_commands() {
              app.add_option("--image", request->image,
                             "The container image, which has isomesh in its PATH")
                  ->type_name("IMAGE")
+                 ->check(wrong_image)
                  ->capture_default_str();
              // All commands have been added before one is parsed.
              app.parse_complete_callback([request, parent = app.get_parent()] {

@@ -65,7 +65,8 @@ std::string replaced(std::string text,
 
 std::vector<std::pair<std::string, std::string>> values_of(const ToolTable& table) {
   return {{"@WHAT@", kWhatItDoes},
-          {"@IMAGE@", table.image},
+          {"@IMAGE@", quoted(table.image)},
+          {"@DOCKER_IMAGE@", quoted("docker://" + table.image)},
           {"@FLAGS@", list_of(table, true, identifier)},
           {"@VALUES@", list_of(table, false, identifier)}};
 }
@@ -97,16 +98,19 @@ std::string cwl_of(const ToolTable& table) {
     }
     inputs[identifier(option)] = std::move(input);
   }
-  return pretty(
-      {{"cwlVersion", "v1.2"},
-       {"class", "CommandLineTool"},
-       {"label", "isomesh"},
-       {"doc", kWhatItDoes},
-       {"hints", {{"DockerRequirement", {{"dockerPull", table.image}}}}},
-       {"baseCommand", {"isomesh", "local"}},
-       {"inputs", inputs},
-       {"outputs",
-        {{"mesh", {{"type", "File"}, {"outputBinding", {{"glob", "$(inputs.output)"}}}}}}}});
+  return pretty({{"cwlVersion", "v1.2"},
+                 {"class", "CommandLineTool"},
+                 {"label", "isomesh"},
+                 {"doc", kWhatItDoes},
+                 {"hints", {{"DockerRequirement", {{"dockerPull", table.image}}}}},
+                 {"baseCommand", {"isomesh", "local"}},
+                 {"inputs", inputs},
+                 {"outputs",
+                  {{"mesh", {{"type", "File"}, {"outputBinding", {{"glob", "$(inputs.output)"}}}}},
+                   {"materials",
+                    {{"type", "File?"},
+                     {"doc", "The colours of the labels, which an OBJ names"},
+                     {"outputBinding", {{"glob", "*.mtl"}}}}}}}});
 }
 
 std::string xnat_of(const ToolTable& table) {
@@ -194,7 +198,9 @@ def options_of(config):
     words = []
     for name, value in config.items():
         if name in FLAGS:
-            words += [f"--{name.replace('_', '-')}"] if value in (True, "true", "True") else []
+            if str(value).lower() not in ("true", "false"):
+                raise ValueError(f"{name} is true or false, not {value}")
+            words += [f"--{name.replace('_', '-')}"] if str(value).lower() == "true" else []
         elif name in VALUES:
             for each in value if isinstance(value, list) else [value]:
                 words += [f"--{name.replace('_', '-')}={each}"]
@@ -211,54 +217,93 @@ rule isomesh:
     input: lambda wildcards: config["volumes"][wildcards.name]
     output: "meshes/{name}.{suffix}"
     params: options=options_of(config)
-    container: "docker://@IMAGE@"
+    container: @DOCKER_IMAGE@
     shell: "isomesh local {input:q} {params.options} -o {output:q}"
 )",
                   values_of(table));
 }
 
+// In the strict syntax, which Nextflow 26.04 requires: declarations only, and no statements beside
+// them.
 std::string nextflow_of(const ToolTable& table) {
   return replaced(R"(// @WHAT@
 // nextflow run isomesh.nf --volumes 'scans/*.nii.gz' --iso otsu --triangles 100000
 // All parameters but `volumes`, `suffix` and `outdir` are options of `isomesh local`.
-nextflow.enable.dsl = 2
 
 params.volumes = null
 params.suffix = 'glb'
 params.outdir = 'meshes'
 
-def flags = [@FLAGS@]
-def values = [@VALUES@]
-
-def quoted(text) { "'" + text.toString().replace("'", "'\\''") + "'" }
-
-def words = []
-params.each { name, value ->
-    def option = '--' + name.replace('_', '-')
-    if (name in flags) { if (value.toString() == 'true') words << option }
-    else if (name in values) { [value].flatten().each { words << option + '=' + quoted(it) } }
+def quoted(text) {
+    return "'" + text.toString().replace("'", "'\\''") + "'"
 }
-params.isomesh_options = words.join(' ')
+
+// Nextflow makes `maxError` of `--max-error`.
+def option_of(name) {
+    return name.replaceAll('([a-z])([A-Z])', '$1_$2').toLowerCase().replace('-', '_')
+}
+
+def options_of(given) {
+    def flags = [@FLAGS@]
+    def values = [@VALUES@]
+    def options = given.collectEntries { name, value -> [(option_of(name)): value] }
+    def words = options.collectMany { name, value ->
+        def option = '--' + name.replace('_', '-')
+        if (value == null || name in ['volumes', 'suffix', 'outdir']) {
+            return []
+        }
+        if (name in flags && value.toString() in ['true', 'false']) {
+            return value.toString() == 'true' ? [option] : []
+        }
+        if (name in values) {
+            return [value].flatten().collect { each -> quoted("${option}=${each}") }
+        }
+        error(name in flags ? "${option} is true or false, not ${value}" : "isomesh local has no option ${option}")
+    }
+    return words.join(' ')
+}
+
+// "sub-01.T1" for "sub-01.T1.nii.gz"
+def name_of(volume) {
+    if (volume.isDirectory()) {
+        return volume.name
+    }
+    return volume.name.replaceFirst('(?i)\\.(gz|bz2|xz)$', '').replaceFirst('(?<=.)\\.[^.]*$', '')
+}
 
 process ISOMESH {
-    container '@IMAGE@'
+    container @IMAGE@
     publishDir params.outdir, mode: 'copy'
 
     input:
-    path volume
+    tuple val(name), path(volume)
+    val options
+    val suffix
 
     output:
-    path "${volume.simpleName}.${params.suffix}"
+    path "${name}.${suffix}", glob: false, emit: mesh
+    path "*.mtl", optional: true, emit: materials
 
     script:
     """
-    isomesh local '${volume}' ${params.isomesh_options} -o '${volume.simpleName}.${params.suffix}'
+    isomesh local ${volume} ${options} -o ${quoted(name + '.' + suffix)}
     """
 }
 
 workflow {
-    if (!params.volumes) error "give --volumes 'scans/*.nii.gz'"
-    ISOMESH(Channel.fromPath(params.volumes, type: 'any'))
+    if (!params.volumes) {
+        error("give --volumes 'scans/*.nii.gz'")
+    }
+    def volumes = channel.fromPath(params.volumes, type: 'any', checkIfExists: true)
+        .map { volume -> tuple(name_of(volume), volume) }
+        .groupTuple()
+        .map { name, found ->
+            if (found.size() > 1) {
+                error("${found.join(' and ')} would both become ${name}.${params.suffix}")
+            }
+            return tuple(name, found[0])
+        }
+    ISOMESH(volumes, options_of(params), params.suffix)
 }
 )",
                   values_of(table));
@@ -290,38 +335,43 @@ for name in FLAGS:
     parser.add_argument("--" + name.replace("_", "-"), action="store_true")
 for name in VALUES:
     parser.add_argument("--" + name.replace("_", "-"), action="append")
-given = vars(parser.parse_args())
+arguments = []
+rest = iter(sys.argv[1:])
+for word in rest:
+    # Joined: argparse takes a value that begins with a minus, such as that of --crop, for an option.
+    value = next(rest, None) if word[:2] == "--" and word[2:].replace("-", "_") in VALUES else None
+    arguments.append(word if value is None else f"{word}={value}")
+given = vars(parser.parse_args(arguments))
 
 words = ["--" + name.replace("_", "-") for name in FLAGS if given[name]]
 for name in VALUES:
     words += [f"--{name.replace('_', '-')}={value}" for value in given[name] or []]
-wanted = [label.removeprefix("sub-") for label in given["participant_label"] or []]
-images = []
-for subject in sorted(given["bids_dir"].glob("sub-*")):
-    if not wanted or subject.name.removeprefix("sub-") in wanted:
-        images += sorted(subject.rglob(f"*_{given['image']}.nii*"))
+subjects = {path.name.removeprefix("sub-"): path for path in sorted(given["bids_dir"].glob("sub-*"))}
+wanted = [label.removeprefix("sub-") for label in given["participant_label"] or subjects]
+if unknown := [label for label in wanted if label not in subjects]:
+    sys.exit(f"no subject {', '.join(unknown)} in {given['bids_dir']}")
+images = {}
+for label in dict.fromkeys(wanted):
+    for image in sorted(subjects[label].rglob(f"*_{given['image']}.nii*")):
+        if image.name.endswith((".nii", ".nii.gz")):
+            stem = image.name.removesuffix(".gz").removesuffix(".nii")
+            mesh = image.relative_to(given["bids_dir"]).with_name(f"{stem}_mesh.{given['suffix']}")
+            if mesh in images:
+                sys.exit(f"{images[mesh]} and {image} would both become {mesh}")
+            images[mesh] = image
 if not images:
     sys.exit(f"no image *_{given['image']}.nii* of the wanted subjects in {given['bids_dir']}")
 output = given["output_dir"]
 output.mkdir(parents=True, exist_ok=True)
-(output / "dataset_description.json").write_text(
-    json.dumps(
-        {
-            "Name": "Surface meshes",
-            "BIDSVersion": "1.9.0",
-            "DatasetType": "derivative",
-            "GeneratedBy": [{"Name": "isomesh", "Container": {"Type": "docker", "Tag": "@IMAGE@"}}],
-        },
-        indent=2,
-    )
-)
+description = output / "dataset_description.json"
+if not description.exists():
+    generator = {"Name": "isomesh", "Container": {"Type": "docker", "Tag": @IMAGE@}}
+    dataset = {"Name": "Surface meshes", "BIDSVersion": "1.9.0", "DatasetType": "derivative", "GeneratedBy": [generator]}
+    description.write_text(json.dumps(dataset, indent=2))
 failed = 0
-for image in images:
-    target = output / image.relative_to(given["bids_dir"]).parent
-    target.mkdir(parents=True, exist_ok=True)
-    stem = image.name.removesuffix(".gz").removesuffix(".nii")
-    mesh = target / f"{stem}_mesh.{given['suffix']}"
-    failed += subprocess.run(["isomesh", "local", image, *words, "-o", mesh]).returncode != 0
+for mesh, image in images.items():
+    (output / mesh).parent.mkdir(parents=True, exist_ok=True)
+    failed += subprocess.run(["isomesh", "local", image, *words, "-o", output / mesh]).returncode != 0
 sys.exit(1 if failed else 0)
 )",
                   values_of(table));

@@ -3,15 +3,27 @@
 A scripted module of one file: Slicer, Edit, Application Settings, Modules, add this folder to the paths. It needs nothing but Slicer's Python.
 """
 
+import contextlib
+import http.client
 import json
 import os
 import tempfile
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
 
 import slicer
 from slicer.ScriptedLoadableModule import ScriptedLoadableModule, ScriptedLoadableModuleLogic, ScriptedLoadableModuleWidget
+
+
+class NoRedirects(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_):
+        return None
+
+
+# Token and volume are for the daemon only: not for a proxy of the environment, nor for where a response leads.
+DIRECTLY = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirects)
 
 
 class Isomesh(ScriptedLoadableModule):
@@ -22,19 +34,44 @@ class Isomesh(ScriptedLoadableModule):
         parent.helpText = "Surfaces of the open volume or segmentation, made by an isomesh daemon. Not a medical device."
 
 
+LONGEST_BUSY_S = 600
+
+
+class Busy(Exception):
+    """The daemon wants the request again after so many seconds."""
+
+    def __init__(self, reason, seconds):
+        super().__init__(reason)
+        self.seconds = seconds
+
+
 class IsomeshLogic(ScriptedLoadableModuleLogic):
     def __init__(self, server, token=""):
         super().__init__()
         self.server = server.rstrip("/")
         self.headers = {"Authorization": f"Bearer {token}"} if token else {}
 
+    def request(self, method, path, body=None, headers=None):
+        return urllib.request.Request(self.server + path, data=body, method=method, headers={**self.headers, **(headers or {})})
+
     def ask(self, method, path, body=None, headers=None):
-        """The bytes of the response. Raises RuntimeError with the daemon's reason."""
-        request = urllib.request.Request(
-            self.server + path, data=body, method=method, headers={**self.headers, **(headers or {})}
-        )
+        """The bytes of the response. Raises RuntimeError with the daemon's reason. Waits while the daemon is busy, for ten minutes at most."""
+        request = self.request(method, path, body, headers)
+        begun = time.monotonic()
+        while True:
+            try:
+                return self.ask_once(request)
+            except Busy as busy:
+                again = time.monotonic() + busy.seconds
+                if again - begun > LONGEST_BUSY_S:
+                    raise RuntimeError(f"isomesh: {busy}") from None
+            while time.monotonic() < again:
+                slicer.app.processEvents()
+                time.sleep(0.05)
+
+    def ask_once(self, request):
         try:
-            with urllib.request.urlopen(request) as response:
+            with DIRECTLY.open(request) as response:
                 return response.read()
         except urllib.error.HTTPError as error:
             text = error.read().decode("utf-8", "replace")
@@ -42,9 +79,13 @@ class IsomeshLogic(ScriptedLoadableModuleLogic):
                 reason = json.loads(text)["detail"]
             except (ValueError, KeyError, TypeError):
                 reason = f"status {error.code}"
+            if error.code in (429, 503):
+                told = error.headers.get("Retry-After", "")
+                raise Busy(reason, max(int(told), 1) if told.isdecimal() and len(told) < 10 else 1) from None
             raise RuntimeError(f"isomesh: {reason}") from None
-        except urllib.error.URLError as error:
-            raise RuntimeError(f"isomesh: {self.server} cannot be reached: {error.reason}") from None
+        except (OSError, http.client.HTTPException) as error:
+            reason = getattr(error, "reason", error)
+            raise RuntimeError(f"isomesh: {self.server} cannot be reached: {reason}") from None
 
     def mesh(self, node, iso="otsu", max_error_mm=None, progress=lambda value, stage: None):
         """Loads the surfaces of a volume at `iso`, or of each segment of a segmentation, as models. Returns their nodes."""
@@ -76,7 +117,9 @@ class IsomeshLogic(ScriptedLoadableModuleLogic):
                 slicer.app.processEvents()
                 job = json.loads(self.ask("GET", f"/v1/jobs/{job['id']}?wait=1"))
         except BaseException:
-            self.ask("DELETE", f"/v1/jobs/{job['id']}?erase=false")
+            # The reason that ended the wait is told at once, not the failure of this request.
+            with contextlib.suppress(RuntimeError, Busy):
+                self.ask_once(self.request("DELETE", f"/v1/jobs/{job['id']}?erase=false"))
             raise
         if job["state"] != "succeeded":
             raise RuntimeError(f"isomesh: {job['error']['detail'] if job['error'] else job['state']}")

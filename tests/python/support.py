@@ -1,5 +1,6 @@
 """A real daemon for each test class, and a server that breaks."""
 
+import contextlib
 import http.server
 import json
 import os
@@ -161,9 +162,10 @@ class FakeServer:
                     if name.lower() not in ("transfer-encoding", "content-length", "connection"):
                         self.send_header(name, value)
                 self.send_header("Content-Length", str(len(content)))
-                self.end_headers()
-                if self.command != "HEAD":
-                    self.wfile.write(content)
+                with contextlib.suppress(ConnectionError):  # the client went away
+                    self.end_headers()
+                    if self.command != "HEAD":
+                        self.wfile.write(content)
 
             do_GET = do_POST = do_PATCH = do_DELETE = do_HEAD = answer
 

@@ -3,8 +3,13 @@
 import contextlib
 import io
 import json
+import os
+import signal
+import socket
 import sys
+import tempfile
 import threading
+import time
 import unittest
 import warnings
 from pathlib import Path
@@ -13,7 +18,7 @@ from unittest import mock
 import isomesh_client
 import numpy
 from limits import LimitedTest
-from support import DaemonTest, FakeServer, ball
+from support import ROOT, DaemonTest, FakeServer, ball
 
 
 class Batches(DaemonTest):
@@ -107,6 +112,73 @@ class Arguments(LimitedTest):
                 client.mesh_all(arguments, **keywords)
         self.assertEqual(client.mesh_all([], iso=1), [])
 
+    def test_no_mesh_replaces_a_source_or_another_mesh(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "set").mkdir()
+            for file in ("x.vtk", "y.vtk", "a b.nii", "a_b.nii", "c.mtl", "set/z.vtk"):
+                (folder / file).write_bytes(b"volume")
+            (folder / "set" / "dangling").symlink_to("nowhere")  # the upload of this folder fails
+            (folder / "link").symlink_to(folder, target_is_directory=True)
+            for sources, to, keywords, text in (
+                (["x.vtk"], "{file}", {}, "the mesh of .*x.vtk would replace .*x.vtk, which is a file of a source"),
+                (["y.vtk", "x.vtk"], "link/{file}", {}, "y.vtk would replace .*link/y.vtk"),
+                (["set", "x.vtk"], lambda _: folder / "set" / "z.vtk", {}, "would replace .*z.vtk"),
+                (["a b.nii", "a_b.nii"], "{name}.obj", {"labels": "all"}, "a b.nii and .*a_b.nii would have the same file, .*a_b.mtl"),
+                (["a b.nii", "a_b.nii"], "{name}.obj", {"masks": True}, "the same file, .*a_b.mtl"),
+                (["c.mtl"], lambda _: folder / "c.obj", {"labels": [1]}, "would replace .*c.mtl"),
+                (["x.vtk", "y.vtk"], lambda each: folder / ("link" if each.stem == "x" else "") / "one.stl", {}, "the same file, .*one.stl"),
+            ):
+                target = to if callable(to) else folder / to
+                with self.subTest(text), self.assertRaisesRegex(ValueError, text):
+                    isomesh_client.Client("http://127.0.0.1:1").mesh_all([folder / each for each in sources], to=target, **keywords)
+            # What is skipped is not replaced: a mesh may lie in the folder of its slices.
+            (folder / "whole").mkdir()
+            (folder / "whole" / "slice.dcm").write_bytes(b"volume")
+            (folder / "whole" / "mesh.stl").write_bytes(b"mesh")
+            of_folder = {"to": lambda each: each / "mesh.stl", "iso": 1}
+            (result,) = isomesh_client.Client("http://127.0.0.1:1").mesh_all([folder / "whole"], skip_existing=True, **of_folder)
+            self.assertTrue(result.skipped)
+            with self.assertRaisesRegex(ValueError, "would replace .*mesh.stl"):
+                isomesh_client.Client("http://127.0.0.1:1").mesh_all([folder / "whole"], **of_folder)
+            # Without labels there are no materials.
+            results = isomesh_client.Client("http://127.0.0.1:1").mesh_all([folder / "a b.nii", folder / "a_b.nii"], to=folder / "{name}.obj", iso=1)
+            self.assertEqual([type(each.error) for each in results], 2 * [isomesh_client.Unreachable])
+
+    def test_a_source_that_no_file_can_be_is_one_failure(self):
+        odd = ["x" * 300 + ".nii", "a\0b.nii", "a\0b/c.nii"]
+        with tempfile.TemporaryDirectory() as folder:
+            good = Path(folder, "good.nii")
+            good.write_bytes(b"x")
+            for to in ("{name}.stl", "{folder}/{name}.stl"):
+                results = isomesh_client.Client("http://127.0.0.1:1").mesh_all(
+                    [*odd, good], to=folder + "/" + to, skip_existing=True, iso=1
+                )
+                self.assertEqual([each.source for each in results], [*odd, good])
+                self.assertIsInstance(results[3].error, isomesh_client.Unreachable)
+                self.assertTrue(all(isinstance(each.error, (OSError, ValueError)) for each in results[:3]), results)
+
+    def test_a_name_has_no_suffix_of_a_volume(self):
+        names = {"x" + suffix: "x" for suffix in isomesh_client.api.VOLUME_SUFFIXES}
+        self.assertGreater(len(names), 30)
+        # The command has a test of the same.
+        more = dict(line.split() for line in (ROOT / "tests/support/names_of_volumes.txt").read_text().splitlines())
+        self.assertGreater(len(more), 9)
+        for file, name in {**names, **more}.items():
+            with tempfile.TemporaryDirectory() as folder:
+                (result,) = isomesh_client.Client("http://127.0.0.1:1").mesh_all([file], to=Path(folder, "{name}.stl"), iso=1)
+                self.assertEqual(result.path.name, name + ".stl")
+
+    def test_the_name_of_a_volume_leads_to_no_other_folder(self):
+        for name, file in (
+            ("../../evil", ".._.._evil.stl"), ("/etc/evil", "_etc_evil.stl"), ("a\\b\n\x1b[31m", "a_b\ufffd\ufffd[31m.stl"),
+            ("..", "__.stl"), ("CT of the head", "CT of the head.stl"),
+        ):
+            volume = {"id": "a" * 64, "name": name, "notes": []}
+            with tempfile.TemporaryDirectory() as folder:
+                (result,) = isomesh_client.Client("http://127.0.0.1:1").mesh_all([volume], to=Path(folder, "{name}.stl"), iso=1)
+                self.assertEqual(result.path, Path(folder, file))
+
     def test_an_interrupt_ends_the_batch_and_its_jobs(self):
         """The second source fails at once, and its result interrupts while the job of the first runs."""
         cancelled = threading.Event()
@@ -130,6 +202,95 @@ class Arguments(LimitedTest):
             with self.assertRaises(KeyboardInterrupt):
                 isomesh_client.Client(server.url).mesh_all([volume, Path("not there")], iso=1, progress=interrupt)
         self.assertTrue(cancelled.is_set())
+
+
+class Interrupts(LimitedTest):
+    """Ctrl-C while all threads of a batch wait for the server."""
+
+    limit_s = 60
+
+    def setUp(self):
+        self.waits = threading.Event()  # a request has come
+        self.over = threading.Event()
+        self.addCleanup(self.over.set)
+        self.seen = []
+
+    def interrupted(self, url, source):
+        """Interrupts a batch as soon as `waits` is set, and returns the seconds until it has ended."""
+
+        def interrupt():
+            self.waits.wait(30)
+            self.began = time.monotonic()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        interrupter = threading.Thread(target=interrupt)
+        interrupter.start()
+        with self.assertRaises(KeyboardInterrupt):
+            isomesh_client.Client(url).mesh_all([source, source, source], workers=2, iso=1)
+        took = time.monotonic() - self.began
+        interrupter.join()
+        return took
+
+    def silent(self, method):
+        """A server that answers no request of that method."""
+
+        def respond(handler, _):
+            self.seen.append(handler.command)
+            if handler.command == method:
+                self.waits.set()
+                self.over.wait(50)
+            return 201, {"Location": "/v1/uploads/7"}, b""
+
+        return FakeServer(respond)
+
+    def test_while_the_server_is_busy(self):
+        def respond(*_):
+            self.waits.set()
+            return 503, {"Retry-After": "40"}, b""
+
+        with FakeServer(respond) as server:
+            self.assertLess(self.interrupted(server.url, b"volume"), 5)
+
+    def test_while_the_server_reads_an_upload(self):
+        with self.silent("POST") as server:
+            self.assertLess(self.interrupted(server.url, b"volume"), 5)
+            self.over.set()
+
+    def test_while_a_large_upload_is_sent_which_is_cancelled(self):
+        with self.silent("PATCH") as server:
+            self.assertLess(self.interrupted(server.url, bytes(9 << 20)), 5)
+            self.over.set()
+        self.assertEqual(sorted(self.seen), ["DELETE", "DELETE", "PATCH", "PATCH", "POST", "POST"])
+
+    def test_while_a_body_gets_stuck(self):
+        """The server takes the beginning of each request only."""
+        held = []
+
+        def serve():
+            with contextlib.suppress(OSError):
+                while True:
+                    held.append(listener.accept()[0])
+                    held[-1].recv(100)
+                    self.waits.set()
+
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            thread = threading.Thread(target=serve)
+            thread.start()
+            self.addCleanup(lambda: [each.close() for each in held])
+            url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+            self.assertLess(self.interrupted(url, bytes(7 << 20)), 5)
+            listener.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+    def test_while_nothing_accepts_connections(self):
+        with socket.create_server(("127.0.0.1", 0), backlog=1) as listener, contextlib.ExitStack() as others:
+            for _ in range(8):  # the queue of connections is full
+                other = others.enter_context(socket.socket())
+                other.setblocking(False)
+                with contextlib.suppress(BlockingIOError):
+                    other.connect(listener.getsockname())
+            threading.Timer(0.5, self.waits.set).start()
+            self.assertLess(self.interrupted(f"http://127.0.0.1:{listener.getsockname()[1]}", b"volume"), 5)
 
 
 if __name__ == "__main__":

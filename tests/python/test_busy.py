@@ -2,6 +2,7 @@
 
 import contextlib
 import http.client
+import pickle
 import threading
 import unittest
 from collections import Counter
@@ -10,6 +11,7 @@ from unittest import mock
 import isomesh_client
 import numpy
 from isomesh_client import busy
+from isomesh_client.stopping import Stop
 from limits import LimitedTest
 from support import DaemonTest, FakeServer, ball
 
@@ -33,8 +35,10 @@ class Clock:
         if self.interrupts:
             raise self.interrupts.pop()
 
+    @contextlib.contextmanager
     def installed(self):
-        return mock.patch.object(busy, "time", self)
+        with mock.patch.object(busy, "time", self), mock.patch.object(Stop, "pause", lambda _, seconds: self.sleep(seconds)):
+            yield
 
 
 class BusyServer(FakeServer):
@@ -88,18 +92,20 @@ class RetryAfter(LimitedTest):
 
     def test_clients_that_were_rejected_together_return_apart(self):
         for asked, latest in ((1, 1.5), (40, 50)):
-            clock = Clock()
+            clock, excused = Clock(), []
             with clock.installed():
                 for _ in range(200):
-                    busy.Patience(100).wait(isomesh_client.Refused(503, {}, asked))
+                    busy.Patience(100, clock.sleep).wait(isomesh_client.Refused(503, {}, asked), excused.append)
+            self.assertEqual(excused, clock.pauses)
             self.assertTrue(all(asked <= pause <= latest for pause in clock.pauses))
             self.assertGreater(max(clock.pauses) - min(clock.pauses), (latest - asked) / 2)
 
     def test_pauses_grow_if_the_server_does_not_say(self):
-        clock, patience = Clock(), busy.Patience(600)
+        clock = Clock()
+        patience = busy.Patience(600, clock.sleep)
         with clock.installed(), self.assertRaises(isomesh_client.Refused):
             for _ in range(NEVER):
-                patience.wait(isomesh_client.Refused(429, {}))
+                patience.wait(isomesh_client.Refused(429, {}), lambda _: None)
         for pause, longest in zip(clock.pauses, (0.5, 1, 2, 4, 8, 15, 15, 15)):
             self.assertTrue(longest / 2 <= pause <= longest, clock.pauses)
         self.assertTrue(570 < sum(clock.pauses) <= 600, clock.pauses)
@@ -209,6 +215,10 @@ class Everything(DaemonTest):
                 isomesh_client.Client(server.url).mesh(volume, iso=0.5, passes=1000)
         with self.assertRaisesRegex(isomesh_client.JobFailed, "cancelled"):
             self.client.wait(next(iter(self.client.jobs())))
+
+    def test_a_client_goes_to_another_process(self):
+        other = pickle.loads(pickle.dumps(self.client))
+        self.assertEqual(len(list(other.volumes())), len(list(self.client.volumes())))
 
     def test_an_interrupt_does_not_wait_long_for_a_server_that_stays_busy(self):
         clock = Clock(interrupts=[KeyboardInterrupt])

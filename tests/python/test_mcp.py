@@ -1,11 +1,14 @@
 """`isomesh mcp`, by a client that speaks the protocol line by line."""
 
 import base64
+import contextlib
+import http.server
 import json
 import os
 import signal
 import socket
 import subprocess
+import threading
 import time
 import unittest
 from pathlib import Path
@@ -15,6 +18,44 @@ from isomesh_client.api import JobOptions
 from support import DAEMON, DaemonTest, ball
 
 COMMAND = Path(DAEMON).with_name("isomesh")
+
+
+class OddServer:
+    """Answers each request with these bytes, as JSON, and those of `silent` methods never."""
+
+    def __init__(self, body, silent=()):
+        self.asked = threading.Event()
+        self.over = threading.Event()
+        odd = self
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def answer(self):
+                odd.asked.set()
+                if self.command in silent:
+                    odd.over.wait()
+                self.send_response(200)
+                self.send_header("Content-Type", "application/json")
+                self.send_header("Content-Length", str(len(body)))
+                self.end_headers()
+                with contextlib.suppress(OSError):
+                    self.wfile.write(body)
+
+            do_GET = do_POST = do_DELETE = answer
+
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.url = f"http://127.0.0.1:{self.server.server_address[1]}"
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.over.set()
+        self.server.shutdown()
+        self.server.server_close()
 
 
 class Session:
@@ -123,6 +164,38 @@ class Mcp(DaemonTest):
             self.assertEqual([each["name"] for each in of_volume], names)
             self.assertEqual((self.place / "all.glb").read_bytes()[:4], b"glTF")
 
+    def test_the_colours_beside_an_obj_replace_no_file_and_stay_in_the_folder(self):
+        folder = self.place / "masks"
+        folder.mkdir()
+        samples = bytes(int(z < 8) for z in range(24) for _ in range(40 * 32))
+        (folder / "low.raw").write_bytes(samples)
+        text = (self.place / "ball.mhd").read_text().replace("ball.raw", "low.raw")
+        (folder / "low.mhd").write_text(text.replace("MET_FLOAT", "MET_UCHAR"))
+        (self.place / "left_hip.mtl").write_text("a user's")
+        outside = self.folder / "outside.mtl"
+        (self.place / "link.mtl").symlink_to(outside)
+        with self.session() as client:
+            for names, told in (
+                (["left hip.obj"], "left hip.obj: its materials left_hip.mtl: exists already"),
+                (["link.obj"], "link.mtl: exists already"),
+                (["new.obj", "new.OBJ"], "new.OBJ: another output writes new.mtl"),
+                (["new.stl", "./new.stl"], "./new.stl: another output writes new.stl"),
+            ):
+                refused = client.call("mesh", files=["masks"], masks=True, output=names)
+                self.assertTrue(refused["isError"])
+                self.assertIn(told, refused["content"][0]["text"])
+            job = client.call("mesh", files=["masks"], masks=True, output=["new.obj"])["structuredContent"]["id"]
+            self.assertIn("newmtl", (self.place / "new.mtl").read_text())
+            self.assertTrue(client.call("fetch", job=job, output=["left hip.obj"])["isError"])
+            # Without labels there are no colours.
+            made = client.call("mesh", files=["ball.mhd"], parameters={"iso": -8}, output=["left hip.obj"])
+            self.assertFalse(made["isError"], made)
+            (self.place / "other.mtl").write_text("a user's")
+            fetched = client.call("fetch", job=made["structuredContent"]["id"], output=["other.obj"])
+            self.assertFalse(fetched["isError"], fetched)
+        self.assertEqual((self.place / "left_hip.mtl").read_text(), "a user's")
+        self.assertFalse(outside.exists())
+
     def test_schemas_come_from_the_table_of_parameters(self):
         with self.session() as client:
             tools = {each["name"]: each for each in client.ask("tools/list")["result"]["tools"]}
@@ -143,6 +216,11 @@ class Mcp(DaemonTest):
                 ({"files": ["/etc/passwd"]}, "is not in the folder"),
                 ({"files": "ball.mhd"}, "files: has the wrong type"),
                 ({}, "files: must name a file"),
+                ({"files": ["ball.mhd"], "volume": "a" * 64}, "files: cannot be given with volume"),
+                ({"volume": "a" * 64, "masks": True}, "masks: cannot be given with volume"),
+                ({"volume": "a" * 64, "volume_index": 0}, "volume_index: cannot be given with volume"),
+                ({"files": ["ball.mhd"], "parameters": {"iso": 1, "formats": ["stl"]}}, "formats: is not one of"),
+                ({"files": ["ball.mhd\0.nii"]}, "U+0000"),
                 ({"files": ["ball.mhd"], "parameters": {"pases": 1}}, "pases"),
                 ({"files": ["ball.mhd"], "parameters": {"iso": 1, "passes": 2000}}, "passes"),
                 ({"files": ["ball.mhd"], "file": 1}, "file: is no argument of mesh"),
@@ -153,6 +231,8 @@ class Mcp(DaemonTest):
                 result = client.call("mesh", **arguments)
                 self.assertTrue(result["isError"], arguments)
                 self.assertIn(told, result["content"][0]["text"])
+            listed = client.call("jobs", job="a", state="failed")
+            self.assertIn("state: cannot be given with job", listed["content"][0]["text"])
             (self.place / "there.stl").write_text("mine")
             again = client.call("mesh", files=["ball.mhd"], parameters={"iso": 1}, output=["there.stl"])
             self.assertIn("exists already", again["content"][0]["text"])
@@ -180,6 +260,9 @@ class Mcp(DaemonTest):
                 client.write(line)
                 response = client.read()
                 self.assertEqual(response.get("error", {}).get("code"), code, line[:80])
+            deep = "[" * 400000 + "]" * 400000
+            client.write('{"jsonrpc": "2.0", "id": 1, "method": "ping", "params": {"a": %s}}' % deep)
+            self.assertEqual(client.read()["error"]["code"], -32700)
             # Notifications and responses get no answer.
             client.notify("notifications/initialized")
             client.notify("no/such/thing")
@@ -188,6 +271,10 @@ class Mcp(DaemonTest):
             self.assertEqual(client.ask("ping")["result"], {})
             old = client.ask("initialize", protocolVersion="1999-01-01")["result"]["protocolVersion"]
             self.assertEqual(old, "2025-06-18")
+            # The last line may lack its end.
+            client.process.stdin.write('"' + "x" * (1 << 20))
+            client.process.stdin.close()
+            self.assertEqual(client.read()["error"]["code"], -32600)
 
     def test_a_cancelled_call_cancels_its_job(self):
         volume = self.client.upload(ball((160, 160, 160), radius=70.0))["id"]
@@ -211,6 +298,25 @@ class Mcp(DaemonTest):
                 for number in reversed(numbers):
                     client.notify("notifications/cancelled", requestId=number)
                 self.assertIn("is empty", client.call("info", volume="")["content"][0]["text"])
+
+    def test_a_server_that_answers_oddly(self):
+        deep = b"[" * 400000 + b"]" * 400000
+        for body in (b"[]", b"7", b"", b"nonsense", b'{"a": ' + deep + b"}"):
+            with OddServer(body) as server, Session(server.url, self.place) as client:
+                result = client.call("volumes")
+                self.assertTrue(result["isError"])
+                self.assertIn("does not match the API", result["content"][0]["text"])
+                self.assertEqual(client.ask("ping")["result"], {})
+
+    def test_a_cancelled_call_does_not_wait_long_for_a_silent_server(self):
+        with OddServer(b'{"volumes": []}', silent=["POST"]) as server, Session(server.url, self.place) as client:
+            arguments = {"volume": "a", "parameters": {"iso": 1}}
+            number = client.send("tools/call", name="mesh", arguments=arguments)
+            self.assertTrue(server.asked.wait(60))
+            client.notify("notifications/cancelled", requestId=number)
+            begun = time.monotonic()
+            self.assertEqual(client.call("volumes")["structuredContent"], {"volumes": []})
+            self.assertLess(time.monotonic() - begun, 60)
 
     def test_progress_is_told_to_whom_asks(self):
         with self.session() as client:

@@ -96,6 +96,7 @@ class PlyFiles(LimitedTest):
             ("faces", numpy.zeros(3, int), "faces must have the shape"),
             ("faces", numpy.array([[0, 1, 4]]), "faces must be from 0 to 3"),
             ("faces", numpy.array([[0, 1, -1]]), "faces must be from 0 to 3"),
+            ("faces", numpy.array([[0, 1, 2.5]]), "faces must be integers"),
             ("labels", numpy.zeros(3, int), "3 labels for 4 faces"),
         ):
             mesh = tetrahedron()
@@ -103,6 +104,23 @@ class PlyFiles(LimitedTest):
             with self.subTest(text), self.assertRaisesRegex(ValueError, text):
                 mesh.save(self.folder / "wrong.ply")
         self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_a_damaged_ply_file_is_rejected(self):
+        points = numpy.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "float32")
+        with tempfile.TemporaryDirectory() as folder:
+            path = isomesh_client.Mesh(points, numpy.array([[0, 1, 2]], "uint32")).save(Path(folder, "one.ply"))
+            whole = path.read_bytes()
+        corner = whole.rindex(b"\x02\0\0\0")
+        for damaged in (
+            whole.replace(b"element vertex 3", b"element vertex x"),
+            whole.replace(b"element vertex 3", b"element vertex -3"),
+            whole.replace(b"element face 1\n", b"element face\n"),
+            whole[:corner] + b"\x03\0\0\0",
+            whole[:-1],
+        ):
+            for without in ({}, {"numpy": None}):
+                with mock.patch.dict(sys.modules, without), self.assertRaises(isomesh_client.WrongAnswer):
+                    isomesh_client.read_ply(damaged)
 
     def test_other_formats_need_a_job(self):
         with self.assertRaisesRegex(ValueError, "saved as .ply only"):

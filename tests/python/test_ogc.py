@@ -10,7 +10,7 @@ from pathlib import Path
 
 import isomesh_client
 import numpy
-from support import DaemonTest, ball
+from support import DaemonTest, FakeServer, ball
 
 FILE = Path(__file__).resolve().parents[2] / "client/ogc/isomesh_ogc.py"
 SPEC = importlib.util.spec_from_file_location("isomesh_ogc", FILE)
@@ -126,6 +126,20 @@ class Processes(DaemonTest):
         self.assertEqual(status, 400)
         self.assertIn("iso", problem["detail"])
 
+    def test_a_daemon_that_answers_oddly(self):
+        problem = {"Content-Type": "application/problem+json"}
+        for answer, wanted in (
+            ((403, problem, b"[1]"), 403),
+            ((403, problem, b'{"title": '), 403),
+            ((200, {}, b"[]"), 502),
+            ((200, {}, b"<html>"), 502),
+            ((302, {"Location": "/elsewhere"}, b""), 502),
+        ):
+            with self.subTest(answer), FakeServer(lambda *_, answer=answer: answer) as server:
+                self.ogc.daemon = server.url
+                status, _, said = self.ask("/jobs/one.raw")
+                self.assertEqual((status, said["status"]), (wanted, wanted))
+
     def test_a_dismissed_job_has_no_results(self):
         volume = self.client.upload(numpy.random.default_rng(1).random((128, 128, 96), "float32"))["id"]
         inputs = {"volume": volume, "format": "ply", "parameters": {"iso": 0.5, "passes": 1000}}
@@ -137,6 +151,13 @@ class Processes(DaemonTest):
             self.client.wait(location.rpartition("/")[2].partition(".")[0])
         self.assertEqual(self.ask(location)[2]["status"], "dismissed")
         self.assertGreaterEqual(self.ask(location + "/results")[0], 400)
+
+    def test_a_host_that_is_none_is_refused(self):
+        for host in (b"[", b"]", b"[::1", b"[x]", b"[::::]", b"\xff", b"", b"a@b:c"):
+            with self.subTest(host=host), socket.create_connection(("127.0.0.1", self.ogc.server_port), timeout=30) as connection:
+                connection.sendall(b"GET / HTTP/1.1\r\nHost: " + host + b"\r\n\r\n")
+                answer = b"".join(iter(lambda: connection.recv(65536), b""))
+                self.assertTrue(answer.startswith(b"HTTP/1.1 421 "), answer)
 
     def test_pages_of_other_sites_are_refused(self):
         for headers, wanted in (({"Host": "evil.example"}, 421), ({"Content-Type": "text/plain"}, 415)):

@@ -2,13 +2,14 @@
 
 import importlib.util
 import sys
+import tempfile
 import types
 import unittest
 from pathlib import Path
 from unittest import mock
 
 import numpy
-from support import DaemonTest, ball
+from support import DaemonTest, FakeServer, ball
 
 MODULE = Path(__file__).resolve().parents[2] / "client/slicer/Isomesh.py"
 
@@ -93,6 +94,55 @@ class Slicer(DaemonTest):
             self.logic.mesh(Node(bytes_=nrrd(ball(), "float")[:-100]))
         with self.assertRaisesRegex(RuntimeError, "cannot be reached"):
             self.module.IsomeshLogic("http://127.0.0.1:1").mesh(Node(bytes_=b"x"))
+
+    def test_a_busy_daemon_is_asked_again(self):
+        asked = []
+
+        def respond(handler, _):
+            asked.append(handler.path)
+            if len(asked) < 3:
+                return 503, {"Retry-After": str(len(asked) - 1)}, b'{"detail": "too many requests"}'
+            return 201, {}, b'{"id": "one"}'
+
+        with FakeServer(respond) as server, tempfile.NamedTemporaryFile() as file:
+            self.assertEqual(self.module.IsomeshLogic(server.url).upload(file.name), "one")
+            self.assertEqual(asked, ["/v1/volumes"] * 3)
+
+    def test_a_daemon_that_stays_busy_is_asked_once_a_second_at_most(self):
+        for told in ("0", "soon", ""):
+            asked = []
+
+            def respond(handler, _, asked=asked, told=told):
+                asked.append(handler.path)
+                return 503, {"Retry-After": told}, b'{"detail": "too many requests"}'
+
+            with self.subTest(told), FakeServer(respond) as server, mock.patch.object(self.module, "LONGEST_BUSY_S", 2):
+                with self.assertRaisesRegex(RuntimeError, "too many requests"):
+                    self.module.IsomeshLogic(server.url).ask("GET", "/v1/jobs")
+                self.assertLessEqual(len(asked), 3)
+
+    def test_the_reason_of_an_end_is_told_when_the_job_cannot_be_cancelled(self):
+        for status, more in ((500, {}), (503, {"Retry-After": "2"})):
+            asked = []
+
+            def respond(handler, _, asked=asked, status=status, more=more):
+                asked.append(handler.command)
+                if handler.command == "DELETE":
+                    return status, more, b'{"detail": "broken"}'
+                return 200, {}, b'{"id": "one", "state": "running", "progress": 0, "stage": "queued"}'
+
+            def stop(*_):
+                raise KeyboardInterrupt
+
+            with self.subTest(status), FakeServer(respond) as server:
+                with self.assertRaises(KeyboardInterrupt):
+                    self.module.IsomeshLogic(server.url).job_of("v", {}, stop)
+                self.assertEqual(asked, ["POST", "DELETE"])
+
+    def test_a_daemon_that_is_busy_for_too_long_is_given_up(self):
+        with FakeServer(lambda *_: (503, {"Retry-After": "601"}, b'{"detail": "too many requests"}')) as server:
+            with self.assertRaisesRegex(RuntimeError, "too many requests"):
+                self.module.IsomeshLogic(server.url).ask("GET", "/v1/jobs")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,14 @@ if TYPE_CHECKING:
     from typing_extensions import NotRequired
 
 
+#: The suffixes of files of volumes.
+VOLUME_SUFFIXES: Sequence[str] = (
+    '.BRIK', '.BRIK.gz', '.HEAD', '.PAR', '.REC', '.bmp', '.btf', '.ccp4', '.cub', '.cube',
+    '.dcm', '.gipl', '.gipl.gz', '.h5', '.hdf5', '.hdr', '.ima', '.img', '.isq', '.lsm', '.map',
+    '.mgh', '.mgz', '.mha', '.mhd', '.mif', '.mif.gz', '.mih', '.mnc', '.mnc2', '.mrc', '.nhdr',
+    '.nii', '.nii.gz', '.npy', '.npz', '.nrrd', '.png', '.raw', '.rec', '.tf8', '.tif', '.tiff',
+    '.vti', '.vtk', '.zarr',
+)
 #: The type of one sample.
 SampleType = Literal['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'float32', 'float64']
 #: The format and suffix of a mesh file. STL, PLY and VTK are binary. vtk is VTK's legacy
@@ -393,9 +401,10 @@ class JobOptions(_Parameters, total=False):
         from the volume's file, or get one of a fixed series.
 
     label_values
-        The sample values of each label, for labels that have several. A value may belong to
-        several labels, which then overlap there. Labels that are not listed keep the values
-        from the volume's file.
+        The labels of the volume that each label joins, for labels that join several. A label of
+        the volume may be in several lists; these labels then overlap there. In a list, it is no
+        longer a label itself, unless it has a list, too. The volume's labels are those of GET
+        /v1/volumes/{id}/labels, also if its samples have other numbers.
 
     scheme
         Number of tetrahedra per cell, or lattice. 6 is Kuhn's split of the primitive cubic

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import os
+import re
 import sys
-import threading
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
-from .files import format_of
+from . import api, uploads
+from .files import files_of_mesh, format_of
 from .parameters import OMITTED, by_keywords, given
+from .stopping import Stop
 
 if TYPE_CHECKING:
-    from . import api
     from .mesh import Mesh
 
     Target = Union[str, os.PathLike[str], Callable[[Any], Union[str, os.PathLike[str]]]]
 
-# Suffixes that name no more than how a file is written. One of each row is left out of names.
-_SUFFIXES = ((".gz", ".bz2", ".zip", ".tar", ".tgz"), (".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm", ".mgz", ".mgh", ".npy"))
+_LONGEST_WAIT = 0.5  # seconds
+_PACKED = (".gz", ".bz2", ".xz", ".zip", ".tar", ".tgz")
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,6 @@ class Result:
         if self.skipped:
             return f"<Result of {name}: {self.path} was there>"
         return f"<Result of {name}: {self.path or self.mesh}>"
-
-
-class _Stopped(BaseException):
-    """Ends the jobs of a batch that was interrupted."""
 
 
 class Batches:
@@ -106,8 +104,8 @@ class Batches:
 
         All other keywords are as for `mesh`, and hold for all volumes. Returns a result for each source, in their
         order. What fails is in `result.error`, and the others go on: `[each for each in results if not each]` are the
-        failures. Raises ValueError before anything is sent if two sources would have the same file. An interrupt cancels
-        the jobs; what is finished by then is on disk.
+        failures. Raises ValueError before anything is sent if two sources would have the same file, or a mesh would
+        replace a source. An interrupt ends uploads and waits, and cancels the jobs; what is finished by then is on disk.
         """
         keywords = locals()
         parameters = given(keywords)
@@ -122,38 +120,41 @@ class Batches:
             raise ValueError("skip_existing needs to=, the files that may be there")
         if to is not None and "formats" in parameters:
             raise ValueError("the suffix in to= selects the format, so formats is not for it")
+        sources = list(sources)
         work = [(source, None if to is None else _target_of(source, to)) for source in sources]
-        _expect_distinct(work)
-        stopped = threading.Event()
+        is_by_labels = parameters.get("labels") is not None or (masks and "iso" not in parameters)
+        files = [[] if path is None else files_of_mesh(path, is_by_labels) for _, path in work]
 
-        def stop_here(_: object) -> None:
-            if stopped.is_set():
-                raise _Stopped
+        def is_skipped(each: Sequence[Path]) -> bool:
+            return skip_existing and all(os.path.exists(file) for file in each)
 
-        def one(source: Any, path: Optional[Path]) -> Result:
-            stop_here(None)
-            if path is not None and skip_existing and path.exists():
+        _expect_distinct(sources, files, is_skipped)
+        stop = Stop()
+        client: Any = copy.copy(self)
+        client._exchange = client._exchange.until(stop)
+
+        def one(source: Any, path: Optional[Path], own: Sequence[Path]) -> Result:
+            stop.check()
+            if is_skipped(own):  # another process may work on the same sources
                 return Result(source, path=path, skipped=True)
             try:
                 if path is None:
-                    mesh = self.mesh(source, progress=stop_here, **of_upload, **parameters)  # type: ignore[attr-defined]
+                    mesh = client.mesh(source, **of_upload, **parameters)
                     return Result(source, mesh=mesh, job=mesh.job)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 wanted = {**parameters, "formats": [format_of(path)]}
-                _, job = self._made(source, of_upload, wanted, stop_here)  # type: ignore[attr-defined]
-                self.download(job, path)  # type: ignore[attr-defined]
+                _, job = client._made(source, of_upload, wanted, None)
+                client.download(job, path)
                 return Result(source, path=path, job=job)
             except Exception as error:
                 return Result(source, path=path, error=error)
 
         with ThreadPoolExecutor(workers) as pool:
-            futures = [pool.submit(one, *each) for each in work]
             try:
+                futures = [pool.submit(one, *each, own) for each, own in zip(work, files)]
                 _tell(futures, progress)
             except BaseException:
-                stopped.set()
-                for future in futures:
-                    future.cancel()
+                stop.set()
                 raise
         return [future.result() for future in futures]
 
@@ -163,16 +164,27 @@ def _name_of(source: Any) -> Tuple[str, str, str]:
     if isinstance(source, (list, tuple)) and source:
         source = source[0]
     if isinstance(source, Mapping):
-        found = str(source.get("name") or str(source.get("id", ""))[:12])
+        found = _plain(str(source.get("name") or str(source.get("id", ""))[:12]))
         return found, found, ""
     if not isinstance(source, (str, os.PathLike)):
         return "", type(source).__name__, ""
     path = Path(os.path.abspath(source))
     name = path.name
-    for row in _SUFFIXES:
-        found = next((each for each in row if name.lower().endswith(each) and len(name) > len(each)), "")
-        name = name[: len(name) - len(found)]
-    return name, path.name, path.parent.name
+    while name != (unpacked := _without(_PACKED, name)):
+        name = unpacked
+    return _without(api.VOLUME_SUFFIXES, name), path.name, path.parent.name
+
+
+def _without(suffixes: Sequence[str], name: str) -> str:
+    """The name without the suffix of these that it has, if more than that remains."""
+    found = next((each for each in suffixes if name.lower().endswith(each.lower()) and len(name) > len(each)), "")
+    return name[: len(name) - len(found)]
+
+
+def _plain(name: str) -> str:
+    """A volume's name, which anybody may have given, as that of a file that stays in its folder."""
+    text = re.sub(r"[\0-\x1f\x7f-\x9f]", "\ufffd", re.sub(r"[/\\]", "_", name))
+    return "_" * len(text) if text in (".", "..") else text
 
 
 def _target_of(source: Any, to: Target) -> Path:
@@ -189,24 +201,47 @@ def _target_of(source: Any, to: Target) -> Path:
     return found
 
 
-def _expect_distinct(work: Sequence[Tuple[Any, Optional[Path]]]) -> None:
+def _expect_distinct(
+    sources: Sequence[Any], files: Sequence[Sequence[Path]], is_skipped: Callable[[Sequence[Path]], bool]
+) -> None:
+    """Raises ValueError if a mesh would replace a source, or a file of another mesh. `files` are those of each mesh."""
+    sent = {_id_of(file) for source in sources for file in uploads.files_of(source)} - {None} if any(files) else set()
     seen: Dict[str, Any] = {}
-    for source, path in work:
-        if path is None:
-            continue
-        key = os.path.abspath(path)
-        if key in seen:
-            raise ValueError(f"{seen[key]} and {source} would have the same file, {path}; use {{folder}} in to=, or a function")
-        seen[key] = source
+    for source, each in zip(sources, files):
+        for file in each:
+            if _id_of(file) in sent and not is_skipped(each):
+                raise ValueError(f"the mesh of {source} would replace {file}, which is a file of a source; use another to=")
+            # A link is replaced itself, and its folder may have several names.
+            key = os.path.join(_real(file.parent), file.name)
+            if key in seen:
+                raise ValueError(f"{seen[key]} and {source} would have the same file, {file}; use {{folder}} in to=, or a function")
+            seen[key] = source
+
+
+def _real(folder: Path) -> str:
+    """The folder without links."""
+    try:
+        return os.path.realpath(folder)
+    except ValueError:  # a name that no folder can have
+        return str(folder)
+
+
+def _id_of(file: Path) -> Optional[Tuple[int, int]]:
+    """The same for all names of a file; None if there is none."""
+    try:
+        found = os.stat(file)
+    except (OSError, ValueError):  # ValueError: a name that no file can have
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _tell(futures: Sequence[Future[Result]], progress: Union[bool, Callable[[Result], object]]) -> None:
     """Waits for all results."""
+    arriving: Any = _arriving(futures)
     if callable(progress):
-        for future in as_completed(futures):
+        for future in arriving:
             progress(future.result())
         return
-    arriving: Any = as_completed(futures)
     if progress:
         try:
             bar = importlib.import_module("tqdm.auto").tqdm
@@ -216,6 +251,15 @@ def _tell(futures: Sequence[Future[Result]], progress: Union[bool, Callable[[Res
             arriving = bar(arriving, total=len(futures), unit="mesh")
     for _ in arriving:
         pass
+
+
+def _arriving(futures: Sequence[Future[Result]]) -> Iterator[Future[Result]]:
+    """The futures as they end."""
+    waiting = set(futures)
+    while waiting:
+        # Python may not notice an interrupt that comes as a wait begins, until that wait ends.
+        done, waiting = wait(waiting, _LONGEST_WAIT, FIRST_COMPLETED)
+        yield from done
 
 
 def _counted(arriving: Any, total: int) -> Any:

@@ -8,13 +8,15 @@ import re
 import time
 from datetime import datetime, timezone
 from email.utils import parsedate_to_datetime
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING, Callable, Optional
 
 if TYPE_CHECKING:
     from .errors import Refused
 
 STATUSES = (429, 503)
-PARTING_SECONDS = 2.0  # for the last requests of a caller that wants to end
+# For the last requests of a caller that wants to end: for a busy server, and for a silent one.
+PARTING_SECONDS = 2.0
+PARTING_SILENCE = 5.0
 _FIRST_PAUSE = 0.5  # seconds; without Retry-After each pause is twice as long as the one before
 _LONGEST_PAUSE = 15.0
 _LEAST_JITTER = 0.5
@@ -44,14 +46,15 @@ def _time_of(text: str) -> Optional[datetime]:
 class Patience:
     """The pauses of one request while the server is busy: `seconds` in all, from its first refusal."""
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self, seconds: float, sleep: Callable[[float], None]) -> None:
         self._seconds = seconds
+        self._sleep = sleep
         self._end: Optional[float] = None
         self._pause = _FIRST_PAUSE
 
-    def wait(self, error: Refused) -> None:
-        """Returns when the request should be sent again. Raises `error` if that helps nothing, or if the
-        time does not last until then. An interrupt ends the wait at once."""
+    def wait(self, error: Refused, excuse: Callable[[float], None]) -> None:
+        """Returns when the request should be sent again. `excuse` gets the seconds before they pass. Raises
+        `error` if waiting helps nothing, or if the time does not last until then."""
         if error.status not in STATUSES:
             raise error
         now = time.monotonic()
@@ -61,7 +64,8 @@ class Patience:
         if pause > self._end - now:
             raise error
         _log.info("the server is busy (%s); the request is sent again in %.1f s", error.status, pause)
-        time.sleep(pause)
+        excuse(pause)
+        self._sleep(pause)
 
     def _next_pause(self, asked: Optional[float]) -> float:
         # Clients that were refused at the same time must not return at the same time.

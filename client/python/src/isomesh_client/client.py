@@ -14,9 +14,9 @@ from urllib.parse import quote, urlencode
 
 from . import answers, busy, ply, uploads
 from .batches import Batches
-from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
+from .errors import IsomeshError, JobFailed, Refused, Unreachable, warn, warn_of_notes
 from .exchange import Exchange
-from .files import FINAL_STATES, Arriving, file_of, format_of, written
+from .files import FINAL_STATES, Arriving, file_of, files_of_mesh, format_of, written
 from .mesh import Mesh, why_empty
 from .parameters import OMITTED, as_query, by_keywords, given
 from .transport import Transport
@@ -276,30 +276,30 @@ class Client(Batches):
         """Waits until the job has succeeded and returns it. Raises JobFailed if it failed or was
         cancelled, and TimeoutError after `timeout` seconds. `progress` is called with the job about
         once a second."""
-        end = None if timeout is None else time.monotonic() + timeout
+        end = float("inf") if timeout is None else time.monotonic() + timeout
         while True:
             asked = time.monotonic()
-            longest = 1.0 if progress else _LONGEST_WAIT
-            if end is not None:
-                longest = max(0, min(longest, end - asked))
+            longest = max(0.0, min(1.0 if progress else _LONGEST_WAIT, end - asked))
             target = f"{_job_path(job)}?wait={longest:.3f}"
-            exchange = self._exchange if end is None else self._exchange.within(max(0.0, end - asked))
+            exchange = self._exchange if timeout is None else self._exchange.within(max(0.0, end - asked), longest)
             try:
                 seen = cast("api.Job", exchange.get(target, answers.JOB, patience=longest))
-            except Refused as error:
-                if end is None or error.status not in busy.STATUSES:
+            except (Refused, Unreachable) as error:
+                is_busy = isinstance(error, Refused) and error.status in busy.STATUSES
+                is_silent = isinstance(error, Unreachable) and time.monotonic() >= end
+                if timeout is None or not (is_busy or is_silent):
                     raise
-                raise TimeoutError(f"the server is busy: {error}; no retry is left in {timeout} s") from error
+                raise TimeoutError(f"no retry is left in {timeout} s: {error}") from error
             if progress:
                 progress(seen)
             if seen["state"] == "succeeded":
                 return cast("api.SucceededJob", answers.checked(seen, answers.SUCCEEDED_JOB))
             if seen["state"] in FINAL_STATES:
                 raise JobFailed(seen)
-            if end is not None and time.monotonic() >= end:
+            if time.monotonic() >= end:
                 raise TimeoutError(f"job {seen['id']} is {seen['state']} after {timeout} s")
             # A server that responds at once does not make this a busy loop.
-            time.sleep(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
+            self._exchange.pause(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
 
     def job_labels(self, job: Union[str, AnyJob]) -> List[api.LabelSummary]:
         """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
@@ -374,14 +374,14 @@ class Client(Batches):
         if label is not None and done["mesh"] is not None:
             labels = done["mesh"].get("labels") or self.job_labels(done)
         announced = file_of(done, form, label, labels)
-        # Readers take several names from the line, divided by blanks, and control characters end it.
-        beside = target.with_name(re.sub(r"[\0-\x20\\]", "_", target.with_suffix(".mtl").name))
+        is_by_labels = label is None and (done.get("parameters") or {}).get("labels") is not None
+        beside = files_of_mesh(target, is_by_labels)[1:]
         with written(target) as file:
-            arriving = Arriving(file, os.fsencode(beside.name) if form == "obj" else None)
+            arriving = Arriving(file, os.fsencode(beside[0].name) if beside else None)
             self._exchange.download(announced, arriving.write)
             arriving.finish()
             if arriving.names_materials:
-                with written(beside) as materials:
+                with written(beside[0]) as materials:
                     materials.write(self._exchange.text(f"{_job_path(done)}/mesh.mtl"))
         return target
 
@@ -405,7 +405,7 @@ class Client(Batches):
             with contextlib.suppress(Exception):
                 # The key finds the job even if its response was interrupted.
                 parting = copy.copy(self)
-                parting._exchange = self._exchange.within(busy.PARTING_SECONDS)
+                parting._exchange = self._exchange.parting()
                 parting.cancel(parting._submit(stored, key, parameters))
             raise
         if done["mesh"]["empty"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import warnings
 from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence, cast
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 
 class IsomeshError(Exception):
     """The base class of this package's exceptions. Wrong arguments raise ValueError or TypeError."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(_printable(text))
 
 
 class Unreachable(IsomeshError):
@@ -41,7 +45,12 @@ def warn(text: str) -> None:
     level = 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
         frame, level = frame.f_back, level + 1
-    warnings.warn(text, VolumeWarning, stacklevel=level)
+    warnings.warn(_printable(text), VolumeWarning, stacklevel=level)
+
+
+def _printable(text: str) -> str:
+    """The same without control characters, which a server may send to the terminal; tabs and line breaks stay."""
+    return re.sub(r"[\0-\x08\x0b-\x1f\x7f-\x9f]", "\ufffd", text)
 
 
 _HERE = os.path.dirname(__file__) + os.sep
@@ -76,7 +85,7 @@ class Refused(IsomeshError):
     @staticmethod
     def _list(problem: Mapping[str, Any], name: str) -> Sequence[Mapping[str, str]]:
         found = problem.get(name)
-        return found if isinstance(found, list) else []
+        return [each for each in found if isinstance(each, dict)] if isinstance(found, list) else []
 
 
 class JobFailed(IsomeshError):
@@ -95,7 +104,7 @@ def refusal(status: int, content_type: str, body: bytes, retry_after: Optional[f
     if content_type.startswith(("application/problem+json", "application/json")):
         try:
             problem = json.loads(body)
-        except ValueError:
+        except (ValueError, RecursionError):
             problem = None
     return Refused(status, problem if isinstance(problem, dict) else {}, retry_after)
 

@@ -11,11 +11,12 @@ from urllib.parse import quote, urlencode
 from . import answers, resume, uploads
 from .errors import WrongAnswer
 from .parameters import as_plain
-from .transport import Answer, Broken, Request, Transport, pause
+from .transport import Answer, Broken, Request, Transport
 
 if TYPE_CHECKING:
     from . import api
     from .answers import Members
+    from .stopping import Stop
     from .uploads import Body
 
 _TRIES = 4
@@ -28,9 +29,21 @@ class Exchange:
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
 
-    def within(self, retry_seconds: float) -> Exchange:
-        """The same exchange, which waits that long for a busy server."""
-        return Exchange(self._transport.within(retry_seconds))
+    def within(self, seconds: float, patience: float = 0) -> Exchange:
+        """The same exchange, which waits that long for a busy server, and little longer for a silent one. `patience` is that
+        of its requests, which is part of the time."""
+        return Exchange(self._transport.within(seconds, patience))
+
+    def until(self, stop: Stop) -> Exchange:
+        """The same exchange, whose requests and pauses raise Stopped as soon as `stop` is set."""
+        return Exchange(self._transport.until(stop))
+
+    def parting(self) -> Exchange:
+        """The same exchange for the last requests of a caller that wants to end."""
+        return Exchange(self._transport.parting())
+
+    def pause(self, seconds: float) -> None:
+        self._transport.pause(seconds)
 
     def get(self, target: str, members: Members, patience: float = 0) -> Dict[str, Any]:
         """The response's object. Raises WrongAnswer if it lacks one of the `members`."""
@@ -93,6 +106,8 @@ class Exchange:
                 if at and not _goes_on(answer, at):
                     digest, at = hashlib.sha256(), 0
                 for piece in answer.pieces():
+                    if at + len(piece) > size:
+                        raise WrongAnswer("the downloaded mesh is longer than its job says")
                     write(at, piece)
                     digest.update(piece)
                     at += len(piece)
@@ -100,7 +115,7 @@ class Exchange:
             except Broken:
                 if attempt == _TRIES:
                     raise
-            pause(attempt)
+            self._transport.rest(attempt)
         if at != size or digest.hexdigest() != announced["sha256"]:
             raise WrongAnswer("the downloaded mesh does not match the job's SHA-256")
 

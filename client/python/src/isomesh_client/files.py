@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
+import re
+import secrets
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Iterable, Iterator, Optional, Union, cast, get_args
+from typing import IO, TYPE_CHECKING, Any, Iterable, Iterator, List, Optional, Union, cast, get_args
 
 from . import api
 from .errors import JobFailed
@@ -50,30 +51,40 @@ def file_of(
     )
 
 
-def _mode_of(target: Path) -> int:
-    """The mode of the file that is replaced, or that of any new file; mkstemp's are for their owner alone."""
-    try:
-        return target.stat().st_mode & 0o777
-    except OSError:
-        mask = os.umask(0)
-        os.umask(mask)
-        return 0o666 & ~mask
+def files_of_mesh(target: Path, is_by_labels: bool) -> List[Path]:
+    """Every file that `Client.download` writes for `target`: first the mesh, then the materials of an OBJ of all labels."""
+    if format_of(target) != "obj" or not is_by_labels:
+        return [target]
+    # Readers take several names from the line that names them, divided by blanks, and control characters end it.
+    return [target, target.with_name(re.sub(r"[\0-\x20\\]", "_", target.with_suffix(".mtl").name))]
 
 
 @contextlib.contextmanager
 def written(target: Path) -> Iterator[IO[bytes]]:
-    """A file to write to, which takes the place of `target` at the end, and is removed on errors."""
-    number, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    """A file to write to, which takes the place of `target` at the end, and is removed on errors. It keeps the mode of the
+    file that it replaces; a new one has that of any new file."""
+    # Without the target's name, which may be as long as a name can be.
+    part = target.with_name(f".isomesh-{secrets.token_hex(8)}.part")
     try:
-        with os.fdopen(number, "wb") as file:
+        replaced: Optional[int] = target.stat().st_mode & 0o777
+    except OSError:
+        replaced = None
+    mode = 0o666 if replaced is None else replaced
+    # The kernel applies the umask, which is the process's own: other threads must not see it change.
+    with open(part, "xb", opener=lambda path, flags: os.open(path, flags, mode)) as file:
+        try:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(part, _mode_of(target))
-        os.replace(part, target)
-    except BaseException:
-        os.unlink(part)
-        raise
+            file.close()  # Windows renames no open file
+            if replaced is not None:
+                os.chmod(part, replaced)
+            os.replace(part, target)
+        except BaseException:
+            with contextlib.suppress(OSError):  # it writes what is left once more, which fails on a full disk
+                file.close()
+            os.unlink(part)
+            raise
 
 
 class Arriving:

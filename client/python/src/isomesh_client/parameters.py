@@ -59,9 +59,14 @@ def by_keywords(method: Call) -> Call:
 
 
 def as_query(parameters: Mapping[str, Any]) -> Dict[str, str]:
-    """The parameters of a query: the members of an object one by one, lists with commas."""
+    """The parameters of a query: the members of an object one by one, lists with commas. Names and colours of labels, which
+    no query takes, change no number of an estimate. Raises ValueError for values of labels, which do."""
+    if parameters.get("label_values"):
+        raise ValueError("an estimate cannot tell label_values")
     query: Dict[str, str] = {}
     for name, value in parameters.items():
+        if name in ("label_names", "label_colors", "label_values"):
+            continue
         key = {"formats": "format"}.get(name, name)
         value = value.tolist() if hasattr(value, "tolist") else value
         if isinstance(value, dict):

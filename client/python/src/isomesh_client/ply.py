@@ -5,6 +5,7 @@ without colours, have it as a property of faces, as the server's files had it be
 
 from __future__ import annotations
 
+import re
 import sys
 from array import array
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
@@ -46,6 +47,8 @@ def parse(source: Union[bytes, bytearray, memoryview]) -> Dict[str, Any]:
     if bytes(faces[::face_size]).strip(b"\x03"):
         raise WrongAnswer("the PLY file has a face that is not a triangle")
     corners = shaped(_columns(faces, triangles, 1, 12), "I", triangles, 3)
+    if triangles and _largest(corners) >= points:
+        raise WrongAnswer("the PLY file has a face of a vertex that does not exist")
     labels = None
     if header.label_of == "face":
         labels = shaped(_columns(faces, triangles, 13, 4), kind, triangles)
@@ -111,13 +114,14 @@ def shaped(data: Any, kind: str, *shape: int) -> Any:
 
 def _of_faces(labels: Any, corners: Any, kind: str) -> Any:
     """The label of each face: that of its first corner."""
-    try:
-        if isinstance(labels, memoryview):
-            found = array(kind, (labels[vertex] for vertex in array("I", corners.tobytes())[::3]))
-            return memoryview(found).toreadonly()
-        return labels[corners[:, 0]]
-    except IndexError as error:
-        raise WrongAnswer("the PLY file has a face of a vertex that does not exist") from error
+    if isinstance(labels, memoryview):
+        found = array(kind, (labels[vertex] for vertex in array("I", corners.tobytes())[::3]))
+        return memoryview(found).toreadonly()
+    return labels[corners[:, 0]]
+
+
+def _largest(corners: Any) -> int:
+    return max(array("I", corners.tobytes())) if isinstance(corners, memoryview) else int(corners.max())
 
 
 def _of_vertices(labels: bytes, corners: bytes, count: int) -> Optional[bytes]:
@@ -195,6 +199,8 @@ def _header_of(text: bytes) -> _Header:
         long_labels = [int(words[4]) for words in told]
     except (ValueError, IndexError) as error:
         raise WrongAnswer("the PLY file has a comment on a label that says none") from error
+    if not all(re.fullmatch("[0-9]{1,10}", count) for count in counts.values()):
+        raise WrongAnswer("the PLY file does not say how many vertices and faces it has")
     return _Header(
         vertices=int(counts["vertex"]),
         faces=int(counts["face"]),
@@ -242,6 +248,8 @@ def _bytes_of(name: str, values: Any, kind: str, *columns: int, below: Optional[
     import numpy
 
     found = numpy.asarray(values)
+    if name == "faces" and found.size and found.dtype.kind not in "iu":
+        raise ValueError(f"faces must be integers, and are of the type {found.dtype}")
     if found.ndim != 1 + len(columns) or found.shape[1:] != columns:
         raise ValueError(f"{name} must have the shape {('n', *columns)}, and has the shape {found.shape}")
     if kind == "B" and found.dtype.kind not in "iu":

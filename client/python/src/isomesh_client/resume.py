@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from typing import Dict, Iterator, Optional, Union
 
-from . import busy, uploads
+from . import uploads
 from .errors import IsomeshError, Refused, Unreachable, WrongAnswer, warn
 from .transport import Answer, Request, Transport
 from .uploads import Body
@@ -40,12 +41,13 @@ def send(transport: Transport, target: str, headers: Dict[str, str], body: Body)
 
 def _give_up(transport: Transport, place: str) -> None:
     try:
-        answer = transport.within(busy.PARTING_SECONDS).send(Request("DELETE", place))
-        told = answer.text()
-    except IsomeshError:
-        return  # the server deletes the upload when it expires
-    if answer.status == 200:
-        ids = ", ".join(volume["id"] for volume in json.loads(told)["volumes"])
+        answer = transport.parting().send(Request("DELETE", place))
+        if answer.status != 200:
+            return
+        ids = ", ".join(volume["id"] for volume in json.loads(answer.text())["volumes"])
+    except (IsomeshError, ValueError, KeyError, TypeError, RecursionError):
+        return  # the caller raises the reason; the server deletes the upload when it expires
+    if ids:
         warn(f"the upload was cancelled too late: the server has stored the volume {ids}")
 
 
@@ -57,74 +59,93 @@ def _is_cancelled(error: Refused) -> bool:
 def _begin(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> str:
     """The address of the upload."""
     told = {**headers, "Upload-Complete": "?0", "Upload-Length": str(body.size)}
-    answer = transport.send(Request("POST", target, told, uploads.of_bytes(b"")))
-    answer.text()
-    place = answer.header("Location")
+    # An upload whose address is lost has no bytes, and expires.
+    answer = transport.repeated(Request("POST", target, told, uploads.of_bytes(b"")))
+    place = re.sub("^https?://[^/]*", "", answer.header("Location"))  # a proxy may have made it absolute
     if not place.startswith(_PLACES):
         raise WrongAnswer(_NOT_THE_API)
     return place
 
 
+class _Outage:
+    """When to give an upload up that does not get on. The outage begins with the first failure after progress. A part
+    that fails may have been received in part, which only the server knows. So nothing is given up before it was asked."""
+
+    def __init__(self) -> None:
+        self.pause = _FIRST_PAUSE
+        self._since: Optional[float] = None
+        self._reached = 0
+
+    def fail(self) -> None:
+        self._since = time.monotonic() if self._since is None else self._since
+
+    def hear(self, offset: int) -> None:
+        """With each answer of the server."""
+        if offset > self._reached:
+            self._since, self.pause, self._reached = None, _FIRST_PAUSE, offset
+
+    def excuse(self, seconds: float) -> None:
+        """With the time for which the client waits because the server is busy, which is no outage."""
+        if self._since is not None:
+            self._since += seconds
+
+    def is_over(self) -> bool:
+        return self._since is not None and time.monotonic() - self._since >= _LONGEST_CUT
+
+    def next_pause(self) -> float:
+        pause, self.pause = self.pause, min(2 * self.pause, _LONGEST_PAUSE)
+        return pause
+
+
 def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer:
     offset: Optional[int] = 0  # None: unknown
-    reached = 0
     is_whole = False
-    cut: Optional[float] = None  # when it broke, if there was no progress since then
     failure: Optional[Union[Refused, Unreachable]] = None
-    wait = _FIRST_PAUSE
+    outage = _Outage()
     while True:
-        # A part that failed may have got on, so the upload is given up only after HEAD.
-        if failure and offset is not None and _is_over(cut):
+        if failure and offset is not None and outage.is_over():
             raise failure
         try:
             if offset is None:
-                state = _look(transport, place)
+                state = _look(transport, place, outage)
                 offset, is_whole = _offset_in(state, body.size), state.header("Upload-Complete") == "?1"
-                if offset > reached:
-                    cut, wait, reached = None, _FIRST_PAUSE, offset
+                outage.hear(offset)
                 continue
             if is_whole:
                 # The body has arrived: this asks for the response that was lost.
                 sign = "&" if "?" in target else "?"
                 target_again = f"{target}{sign}upload={place.rpartition('/')[2]}"
-                return transport.send(Request("POST", target_again, {}, uploads.of_bytes(b"")))
+                return transport.send_whole(Request("POST", target_again, {}, uploads.of_bytes(b"")), outage.excuse)
             part = {
                 "Content-Type": "application/partial-upload",
                 "Upload-Complete": "?1",
                 "Upload-Offset": str(offset),
             }
-            return transport.send(Request("PATCH", place, part, _after(body, offset)))
+            return transport.send_whole(Request("PATCH", place, part, _after(body, offset)), outage.excuse)
         except (Refused, Unreachable) as error:
             if isinstance(error, Refused) and (error.status not in _PASSING or _is_cancelled(error)):
                 raise
-            cut = time.monotonic() if cut is None else cut
-            if offset is None and _is_over(cut):
+            outage.fail()
+            if offset is None and outage.is_over():
                 raise
             failure = error
         offset = None
-        time.sleep(wait)
-        wait = min(2 * wait, _LONGEST_PAUSE)
+        transport.pause(outage.next_pause())
 
 
-def _is_over(cut: Optional[float]) -> bool:
-    return cut is not None and time.monotonic() - cut >= _LONGEST_CUT
-
-
-def _look(transport: Transport, place: str) -> Answer:
+def _look(transport: Transport, place: str, outage: _Outage) -> Answer:
     try:
-        state = transport.send(Request("HEAD", place))
+        return transport.send_whole(Request("HEAD", place), outage.excuse)
     except Refused as error:
         if error.status != 409:
             raise
         # The reason of a conflict is in the body of a GET.
-        state = transport.send(Request("GET", place))
-    state.text()
-    return state
+        return transport.send_whole(Request("GET", place), outage.excuse)
 
 
 def _offset_in(state: Answer, size: int) -> int:
     text = state.header("Upload-Offset")
-    if not text.isdigit() or int(text) > size:
+    if not re.fullmatch("[0-9]{1,20}", text) or int(text) > size:
         raise WrongAnswer(_NOT_THE_API)
     return int(text)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
@@ -62,6 +63,20 @@ def of_paths(paths: Sequence[Path]) -> Body:
         size = file.stat().st_size
         return Body(size, lambda: _read(file, size), name)
     return _tar(members, name)
+
+
+def files_of(source: Any) -> List[Path]:
+    """The files that `of_source` would send, for a source that is no array. Also those of a source that it rejects."""
+    paths = source if isinstance(source, (list, tuple)) else [source]
+    files: List[Path] = []
+    for path in (Path(each) for each in paths if isinstance(each, (str, os.PathLike)) and each != ""):
+        try:
+            files += [file for _, file in _files_of(path)]
+        except (OSError, ValueError):
+            files.append(path)
+            with contextlib.suppress(OSError, ValueError):  # a name that no file can have
+                files += path.rglob("*")
+    return files
 
 
 def _path(source: Union[str, os.PathLike[str]]) -> Path:

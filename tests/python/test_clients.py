@@ -1,0 +1,188 @@
+"""What each client does when its server is busy, breaks, moves or rejects it. One table for the command, the Python package and the
+JavaScript module: each is a program of its own that uploads a file in parts.
+
+Pauses of a minute are not waited for here. That the time of a busy server is no outage is tested by PatienceTest (C++), test_resume.py
+and resume.test.ts.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+import urllib.request
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from scripted import CUT, HALF, LOST, SILENT, UPLOAD, VOLUME, ScriptedServer
+from support import DAEMON, DaemonTest
+
+CONTENT = bytes(range(251)) * (9 << 12)  # is sent in parts
+PYTHON = """
+import sys, isomesh_client
+client = isomesh_client.Client(sys.argv[1])
+"""
+JAVASCRIPT = """
+import { readFile } from 'node:fs/promises';
+import { Client } from './client.mjs';
+const over = new AbortController();
+process.on('SIGINT', () => over.abort());
+const [server, file] = process.argv.slice(2);
+const options = { name: 'head.nii', signal: over.signal };
+try {
+  const { volumes } = await new Client({ server }).upload(await readFile(file), options);
+  console.log(volumes[0].volume.id);
+} catch (error) {
+  console.error(error);
+  process.exitCode = 1;
+}
+"""
+
+
+@dataclass
+class Case:
+    script: dict  # as ScriptedServer takes it; OTHER and OWN stand for the addresses of another server and this one
+    calls: list  # what the server is asked
+    succeeds: bool = True
+    interrupted: bool = False  # Ctrl-C when the server is silent or busy
+    may_end: list = field(default_factory=list)  # calls that may follow: a client tells the server that it has given up
+    proxy: bool = False  # the environment names a proxy
+
+
+CASES = {
+    "well": Case({}, ["POST 201", "PATCH 201"]),
+    "busy": Case(
+        {"POST": [(503, {})], "PATCH": [(429, {"Retry-After": "soon"})]},
+        ["POST 503", "POST 201", "PATCH 429", "PATCH 201"],
+    ),
+    "broken": Case({"PATCH": [(CUT, {})]}, ["POST 201", "PATCH cut", "HEAD 204", "PATCH 201"]),
+    "broken and then busy": Case(
+        {"PATCH": [(CUT, {})], "HEAD": [(503, {"Retry-After": "1"})]},
+        ["POST 201", "PATCH cut", "HEAD 503", "HEAD 204", "PATCH 201"],
+    ),
+    "broken at the beginning": Case({"POST": [(CUT, {}), (CUT, {})]}, ["POST cut", "POST cut", "POST 201", "PATCH 201"]),
+    "a response is lost": Case({"PATCH": [(LOST, {})]}, ["POST 201", "PATCH lost", "HEAD 204", "POST 200"]),
+    "a response breaks": Case({"PATCH": [(HALF, {})]}, ["POST 201", "PATCH half", "HEAD 204", "POST 200"]),
+    "a gateway does not reach the server": Case({"PATCH": [(502, {})]}, ["POST 201", "PATCH 502", "HEAD 204", "PATCH 201"]),
+    "another daemon": Case({"PATCH": [(410, {})]}, ["POST 201", "PATCH 410", "POST 201"]),
+    "revoked": Case({"PATCH": [(401, {})]}, ["POST 201", "PATCH 401"], succeeds=False, may_end=["DELETE 204"]),
+    "rejected": Case({"PATCH": [(413, {})]}, ["POST 201", "PATCH 413"], succeeds=False, may_end=["DELETE 204"]),
+    "redirected": Case({"POST": [(307, {"Location": "OTHER/v1/volumes"})]}, ["POST 307"], succeeds=False),
+    "redirected later": Case(
+        {"PATCH": [(308, {"Location": f"OTHER{UPLOAD}"})]}, ["POST 201", "PATCH 308"], succeeds=False, may_end=["DELETE 204"]
+    ),
+    "an address that a gateway made whole": Case({"POST": [(201, {"Location": f"OWN{UPLOAD}"})]}, ["POST 201", "PATCH 201"]),
+    "an address elsewhere": Case({"POST": [(201, {"Location": "OTHER/elsewhere"})]}, ["POST 201"], succeeds=False),
+    **{
+        f"what has arrived is {text!r}": Case(
+            {"PATCH": [(CUT, {})], "HEAD": [(204, {"Upload-Offset": text} if text else {})]},
+            ["POST 201", "PATCH cut", "HEAD 204"], succeeds=False, may_end=["DELETE 204"],
+        )
+        for text in ("", "-1", "\xb2", "1e3", str(1 << 40), "9" * 30)
+    },
+    "a proxy in the environment": Case({}, ["POST 201", "PATCH 201"], proxy=True),
+    "interrupted while the server is silent": Case(
+        {"PATCH": [(SILENT, {})]}, ["POST 201", "PATCH silent", "DELETE 204"], succeeds=False, interrupted=True
+    ),
+    "interrupted while the server is busy": Case(
+        {"PATCH": [(503, {"Retry-After": "60"})]}, ["POST 201", "PATCH 503", "DELETE 204"], succeeds=False, interrupted=True
+    ),
+}
+
+
+class Untouched:
+    """Another server, which nobody may connect to."""
+
+    def __enter__(self):
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+        return self
+
+    def __exit__(self, *_):
+        self.listener.close()
+
+    def is_untouched(self):
+        self.listener.setblocking(False)
+        try:
+            self.listener.accept()[0].close()
+        except BlockingIOError:
+            return True
+        return False
+
+
+class Clients(DaemonTest):
+    """The daemon serves the JavaScript module."""
+
+    limit_s = 200
+
+    @classmethod
+    def prepare(cls, folder):
+        (folder / "head.nii").write_bytes(CONTENT)
+        (folder / "upload.mjs").write_text(JAVASCRIPT)
+
+    @classmethod
+    def start(cls):
+        super().start()
+        with urllib.request.urlopen(f"{cls.url}/client.js") as response:
+            (cls.folder / "client.mjs").write_bytes(response.read())
+
+    def run_client(self, command, case):
+        """The exit status and the output of a client, with the server that it talked to."""
+        with Untouched() as other:
+            script = {
+                method: [(step, {name: text.replace("OTHER", other.url) for name, text in headers.items()}) for step, headers in steps]
+                for method, steps in case.script.items()
+            }
+            with ScriptedServer(script) as server:
+                environment = {name: text for name, text in os.environ.items() if "proxy" not in name.lower()}
+                if case.proxy:
+                    names = ("http_proxy", "HTTP_PROXY", "https_proxy", "HTTPS_PROXY", "all_proxy", "ALL_PROXY")
+                    environment.update(dict.fromkeys(names, other.url))
+                process = subprocess.Popen(
+                    [part.replace("SERVER", server.url) if isinstance(part, str) else part for part in command],
+                    cwd=self.folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                )
+                try:
+                    if case.interrupted:
+                        self.assertTrue(server.silent.wait(30))
+                        process.send_signal(signal.SIGINT)
+                    out, err = process.communicate(timeout=20)
+                finally:
+                    process.kill()
+                    process.wait()
+            return process.returncode, out, err, server, other.is_untouched()
+
+    def assert_table(self, command, mesh=()):
+        """`mesh`: the calls of a client that makes a mesh of the volume."""
+        for name, case in CASES.items():
+            with self.subTest(name):
+                status, out, err, server, is_alone = self.run_client(command, case)
+                self.assertTrue(is_alone, "another server was asked")
+                self.assertEqual(status == 0, case.succeeds, err)
+                ends = [[*case.calls, *mesh]] if case.succeeds else [case.calls, [*case.calls, *case.may_end]]
+                self.assertIn(server.calls, ends, err)
+                if case.succeeds:
+                    self.assertIn(VOLUME, out)
+                    self.assertTrue(server.bytes == CONTENT)
+
+    def test_the_command(self):
+        self.assert_table([DAEMON.with_name("isomesh"), "--server", "SERVER", "upload", "head.nii"])
+
+    def test_the_python_package(self):
+        self.assert_table([sys.executable, "-c", PYTHON + "print(client.upload('head.nii')['id'])", "SERVER"])
+
+    def test_a_batch_of_the_python_package(self):
+        """The upload runs in another thread than the interrupt."""
+        batch = "result, = client.mesh_all(['head.nii'], to='out/{name}.stl', iso=1)\n"
+        told = "if result.error: raise result.error\nprint(result.job['volume'])\n"
+        self.assert_table([sys.executable, "-c", PYTHON + batch + told, "SERVER"], ["POST 200", "GET 200", "GET 200"])
+
+    def test_the_javascript_module(self):
+        self.assert_table([shutil.which("node"), "upload.mjs", "SERVER", "head.nii"])
+
+
+if __name__ == "__main__":
+    unittest.main()
