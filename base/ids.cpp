@@ -28,23 +28,39 @@ std::string host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
 }
 
+namespace {
+
+// The milliseconds since 1970 and a counter in the twelve bits after them, which orders the ids of
+// one millisecond (RFC 9562, section 6.2, method 1).
+std::int64_t first_stamp_at(std::chrono::system_clock::time_point time) {
+  constexpr int kCounterBits = 12;
+  const auto since_1970 = std::chrono::floor<std::chrono::milliseconds>(time.time_since_epoch());
+  return since_1970.count() << kCounterBits;
+}
+
+std::string hex_of(std::int64_t stamp) {
+  std::array<char, 20> digits = {};
+  std::snprintf(digits.data(), digits.size(), "%015llx", static_cast<unsigned long long>(stamp));
+  return digits.data();
+}
+
+}  // namespace
+
+std::string first_id_at(std::chrono::system_clock::time_point time) {
+  const std::string digits = hex_of(std::max<std::int64_t>(first_stamp_at(time), 0));
+  return digits.substr(0, 8) + '-' + digits.substr(8, 4);
+}
+
 std::string time_ordered_id(std::chrono::system_clock::time_point now) {
-  // A counter in the twelve bits after the time orders the ids of one millisecond (RFC 9562,
-  // section 6.2, method 1).
   static std::mutex mutex;
   static std::int64_t last_stamp = 0;
-  constexpr int kCounterBits = 12;
-  const auto since_1970 =
-      std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch());
-  std::int64_t stamp = since_1970.count() << kCounterBits;
+  std::int64_t stamp = first_stamp_at(now);
   {
     const std::lock_guard lock(mutex);
     stamp = std::max(stamp, last_stamp + 1);
     last_stamp = stamp;
   }
-  std::array<char, 20> digits = {};
-  std::snprintf(digits.data(), digits.size(), "%015llx", static_cast<unsigned long long>(stamp));
-  const std::string time(digits.data());
+  const std::string time = hex_of(stamp);
   const std::string random = random_hex(8);
   return time.substr(0, 8) + '-' + time.substr(8, 4) + "-7" + time.substr(12, 3) + "-a" +
          random.substr(0, 3) + '-' + random.substr(3, 12);

@@ -16,6 +16,10 @@ std::string random_hex(std::size_t bytes);
 std::string time_ordered_id(
     std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
 
+// Sorts before all time-ordered ids of that time and later ones, and after those of earlier
+// milliseconds.
+std::string first_id_at(std::chrono::system_clock::time_point time);
+
 // This machine's name; "-" if it has none.
 std::string host_name();
 

@@ -33,6 +33,8 @@ bool has_control_characters(std::string_view text);
 
 // Replaces tabs and the characters of has_control_characters() by U+FFFD.
 std::string printable(std::string_view text);
+// The same, but line breaks stay.
+std::string printable_lines(std::string_view text);
 
 // The longest prefix of a UTF-8 text of at most `most_bytes` bytes that does not split a character.
 std::string_view beginning(std::string_view text, std::size_t most_bytes);

@@ -14,6 +14,7 @@
 
 #include "base/descriptor.h"
 #include "client/cli/commands.h"
+#include "client/cli/console.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/options.h"
 #include "client/mcp/command.h"
@@ -117,7 +118,7 @@ int main(int argc, char** argv) {
     (exit.status() == 0 ? std::cout : std::cerr) << exit.what();
     status = exit.status();
   } catch (const std::exception& error) {
-    std::cerr << "isomesh: " << error.what() << '\n';
+    complain(error.what());
   }
   std::cout.flush();
   interrupt.end_by_signal();

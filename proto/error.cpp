@@ -49,6 +49,8 @@ constexpr std::array kDescriptions = {
 
 }  // namespace
 
+std::span<const ErrorDescription> error_descriptions() { return kDescriptions; }
+
 const ErrorDescription& describe(ErrorCode code) {
   return *std::ranges::find(kDescriptions, code, &ErrorDescription::code);
 }

@@ -1,6 +1,7 @@
 // Error codes: their names, their HTTP status and their form on the wire.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,9 @@ struct ErrorDescription {
   std::string_view name;
   std::string_view title;
 };
+
+// Of every code.
+std::span<const ErrorDescription> error_descriptions();
 
 // Constant time; every code has a description.
 const ErrorDescription& describe(ErrorCode code);

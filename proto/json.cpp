@@ -29,19 +29,14 @@ Job bounded(Job job) {
   return job;
 }
 
-template <class T>
-std::string record_of(const T& value) {
-  JsonTree record;
-  json_values::write_record(record.root(), value);
-  return dump(record.root());
-}
-
 }  // namespace
 
 using json_values::from_record;
 using json_values::from_text;
+using json_values::full_text;
 using json_values::object;
 using json_values::page;
+using json_values::record_of;
 using json_values::to_text;
 
 std::string to_json(const Volume& volume) { return to_text(volume); }
@@ -79,6 +74,9 @@ std::string to_json(const std::vector<LabelSummary>& labels, const std::string& 
 std::string to_json(const std::vector<WallSummary>& walls, const std::string& next) {
   return page("walls", walls, next);
 }
+
+std::string to_full_json(const Volume& volume) { return full_text(volume); }
+std::string to_full_json(const Job& job) { return full_text(job); }
 
 std::string to_record(const Volume& volume) { return record_of(volume); }
 std::string to_record(const Job& job) { return record_of(job); }

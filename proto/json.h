@@ -1,7 +1,8 @@
 // JSON <-> types. The only place that spells the API's field names.
 //
 // All functions are thread safe. Readers of responses ignore unknown members, so that an older
-// client understands a newer server. Readers of requests reject them.
+// client understands a newer server. Readers of requests reject them. Readers of responses fail for
+// a volume or job whose id has not the form of ids (is_id), and leave it out of a list.
 #pragma once
 
 #include <optional>
@@ -58,13 +59,18 @@ std::vector<WallSummary> walls_from_json(std::string_view text);
 // The cursor of the page after one of volumes, jobs or orders; empty if that is the last.
 std::string next_from_json(std::string_view page);
 
-// A volume as stores and imports write it: to_json() with its labels.
+// to_json() with its labels.
+std::string to_full_json(const Volume& volume);
+// to_json() without its omissions, and with the files of its labels and walls.
+std::string to_full_json(const Job& job);
+
+// A volume or a job as a store keeps it: to_full_json() with a digest (record_digest.h).
 std::string to_record(const Volume& volume);
-// A job as a store keeps it: to_json() in full, with the files of its labels and walls.
 std::string to_record(const Job& job);
 
 // Reads the text of to_record(), or of to_json() for a timing, from this version or an older one.
-// Members that the older version lacked have their defaults. Throws Error kInternal.
+// Members that the older version lacked have their defaults. Throws Error kInternal, also if the
+// record is not the one that its digest was made of.
 Volume volume_from_record(std::string_view text);
 Job job_from_record(std::string_view text);
 Timing timing_from_record(std::string_view text);

@@ -15,6 +15,7 @@
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json_tree.h"
+#include "proto/record_digest.h"
 
 namespace isomesh::json_values {
 
@@ -134,6 +135,12 @@ std::string page(const char* name, const std::vector<T>& items, const std::strin
   return dump(tree.root());
 }
 
+// In full, for readers of this program.
+template <class T>
+void write_record(Json& place, const T& value) {
+  write(place, value);
+}
+
 inline void write_record(Json& place, const Volume& volume) {
   write(place, volume);
   if (!volume.labels.empty()) write_field(place, "labels", volume.labels);
@@ -147,6 +154,18 @@ inline void write_record(Json& place, const Job& job) {
   if (job.mesh && job.mesh->wall_list) {
     write_field(member(place, "mesh"), "wall_list", job.mesh->wall_list);
   }
+}
+
+template <class T>
+std::string full_text(const T& value) {
+  JsonTree tree;
+  write_record(tree.root(), value);
+  return dump(tree.root());
+}
+
+template <class T>
+std::string record_of(const T& value) {
+  return with_digest(full_text(value));
 }
 
 // --- Reading -------------------------------------------------------------------------------------
@@ -258,6 +277,47 @@ void read(const Json& json, T& value) {
 }
 
 template <class T>
+concept WithId = requires(const T& value) {
+  is_id(value.id);
+};
+
+// False if a text is no id, where the value has its own or names another object. An empty text
+// names none.
+template <class T>
+bool has_ids(const T& value) {
+  const auto names_one = [](const std::optional<std::string>& id) {
+    return !id || id->empty() || is_id(*id);
+  };
+  bool has = true;
+  if constexpr (WithId<T>) has = is_id(value.id);
+  if constexpr (requires { names_one(value.volume); }) has = has && names_one(value.volume);
+  if constexpr (requires { names_one(value.job); }) has = has && names_one(value.job);
+  if constexpr (requires { names_one(value.label_volume); }) {
+    has = has && names_one(value.label_volume);
+  }
+  if constexpr (requires { value.parameters; }) has = has && has_ids(value.parameters);
+  return has;
+}
+
+// Programs print ids for shells and give them to files. So no other text comes in as one: an object
+// with such an id fails, and in a list it is left out.
+template <class T>
+void check_ids(T& value) {
+  if constexpr (std::is_class_v<T>) {
+    if (!has_ids(value)) throw Error(ErrorCode::kInternal, "has an id that cannot be one");
+  }
+  if constexpr (std::is_same_v<T, UploadedVolume>) {
+    if (value.volume) check_ids(*value.volume);
+  } else if constexpr (requires { value.emplace_back(); }) {
+    if constexpr (WithId<typename T::value_type>) {
+      std::erase_if(value, [](const auto& each) { return !has_ids(each); });
+    } else {
+      for (auto& each : value) check_ids(each);
+    }
+  }
+}
+
+template <class T>
 T from_text(std::string_view text, const char* list = nullptr) {
   try {
     const JsonTree tree(text);
@@ -265,6 +325,7 @@ T from_text(std::string_view text, const char* list = nullptr) {
     if (json == nullptr) throw Error(ErrorCode::kInternal, std::string("lacks ") + list);
     T value{};
     read(*json, value);
+    check_ids(value);
     return value;
   } catch (const Error& error) {
     throw error.with_detail(std::string("the server's response ") + error.what());
@@ -281,12 +342,23 @@ void fill_with_defaults(Json& record) {
   fill(record, defaults.root());
 }
 
-// Members that an older version did not write have their defaults.
+// The members that every version writes. Volumes of older versions have no digest, so a wrong byte
+// in the name of one would give it its default.
+inline void check_oldest_members(const Json& volume) {
+  for (const char* const name : {"format", "dims", "type", "spacing", "origin", "direction",
+                                 "range", "suggested_iso", "bytes", "created"}) {
+    existing(volume, name);
+  }
+}
+
+// Reads the text of record_of(). Other members that an older version did not write have their
+// defaults.
 template <class T>
 T from_record(std::string_view text) {
   try {
-    JsonTree tree(text);
+    JsonTree tree(without_digest(text));
     check_object(tree.root());
+    if constexpr (std::is_same_v<T, Volume>) check_oldest_members(tree.root());
     fill_with_defaults<T>(tree.root());
     if constexpr (std::is_same_v<T, Job>) {
       fill_with_defaults<MeshSummary>(member(tree.root(), "mesh"));

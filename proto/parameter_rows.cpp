@@ -179,12 +179,12 @@ constinit const Parameter kLabelColors = {
 constinit const Parameter kLabelValues = {
     .name = "label_values",
     .title = "Label values",
-    .help = "The sample values of each label, for labels that have several.",
+    .help = "The labels of the volume that each label joins, for labels that join several.",
     .more =
-        "A value may belong to several labels, which then overlap there. Labels "
-        "that are not listed keep the values from the volume's file.",
-    .minimum = kLeastSample,
-    .maximum = kMostSample,
+        "A label of the volume may be in several lists; these labels then overlap there. In a "
+        "list, "
+        "it is no longer a label itself, unless it has a list, too. The volume's labels are those "
+        "of `GET /v1/volumes/{id}/labels`, also if its samples have other numbers.",
     .jobs = JobKind::kByLabels,
     .may_be_absent = true,
     .in_query = false,

@@ -108,7 +108,7 @@ struct MeshParameters {
   std::int64_t background = 0;  // the value outside of all labels
   LabelTexts label_names = {};
   LabelTexts label_colors = {};   // "#rrggbb"
-  LabelValues label_values = {};  // of labels with more values than their own number
+  LabelValues label_values = {};  // the volume's labels that each of these joins
 
   bool operator==(const MeshParameters&) const = default;
 };

@@ -1,5 +1,6 @@
 #include "proto/types.h"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string_view>
@@ -128,6 +129,13 @@ std::size_t bytes_per_sample(SampleType type) {
 
 bool is_integer(SampleType type) {
   return with_sample(type, [](auto sample) { return std::is_integral_v<decltype(sample)>; });
+}
+
+bool is_id(std::string_view text) {
+  constexpr std::size_t kLongest = 64;
+  const auto is_of_id = [](char c) { return is_letter_or_digit(c) || c == '-'; };
+  return !text.empty() && text.size() <= kLongest && text.front() != '-' &&
+         std::ranges::all_of(text, is_of_id);
 }
 
 bool is_color(std::string_view text) {

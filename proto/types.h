@@ -34,6 +34,10 @@ enum class SampleType {
 std::size_t bytes_per_sample(SampleType type);
 bool is_integer(SampleType type);
 
+// True for text in the form of all ids of the API: 1 to 64 ASCII letters, digits and hyphens, with
+// no hyphen first. So an id is one word of a shell and no option, and can be in a file's name.
+bool is_id(std::string_view text);
+
 // The position of sample (i,j,k) is origin + direction * diag(spacing) * (i,j,k), in millimetres,
 // LPS. `direction` is row-major; its columns are the unit vectors of the axes i, j, k.
 struct Geometry {

@@ -168,11 +168,18 @@ std::shared_ptr<CLI::Config> config_file(const CLI::App& cli) {
   return std::make_shared<ConfigFile>(cli);
 }
 
-std::string as_toml(const CLI::Option& option, const std::string& value) {
+std::string as_toml(const CLI::Option& option, const std::vector<std::string>& values) {
   const Kind kind = kind_of(option);
+  if (takes_many(option) && values.size() != 1) {
+    std::string list;
+    for (const std::string& value : values) {
+      list += (list.empty() ? "" : ", ") + in_toml_quotes(value);
+    }
+    return '[' + list + ']';
+  }
+  const std::string value = values.empty() ? "" : values.front();
   if (kind == Kind::kFlag && (value == "true" || value == "false")) return value;
   if (kind == Kind::kNumber && is_toml_number(value)) return value;
-  if (value.empty() && takes_many(option)) return "[]";
   return in_toml_quotes(value);
 }
 

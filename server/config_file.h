@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -18,7 +19,8 @@ namespace isomesh {
 // with values of their type. `cli` must outlive the result.
 std::shared_ptr<CLI::Config> config_file(const CLI::App& cli);
 
-// An option's value as TOML. Such a file reads it as the same value if it is UTF-8, as all TOML is.
-std::string as_toml(const CLI::Option& option, const std::string& value);
+// An option's values as TOML: one, or a list if it is an option that takes several. Such a file
+// reads them as the same values if they are UTF-8, as all TOML is.
+std::string as_toml(const CLI::Option& option, const std::vector<std::string>& values);
 
 }  // namespace isomesh

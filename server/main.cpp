@@ -24,6 +24,7 @@
 #include "base/descriptor.h"
 #include "base/log.h"
 #include "base/niceness.h"
+#include "base/text.h"
 #include "proto/json_tree.h"
 #include "server/blobs.h"
 #include "server/callbacks/callbacks.h"
@@ -345,7 +346,7 @@ int run(const Options& options, const sigset_t& signals) {
 // machines read it.
 void tell_failure(LogFormat format, const std::string& reason) {
   if (format == LogFormat::kText) {
-    std::cerr << "isomeshd: " << valid_utf8(reason) << std::endl;
+    std::cerr << "isomeshd: " << printable_lines(valid_utf8(reason)) << std::endl;
     return;
   }
   start_log(format, LogLevel::kCritical);

@@ -45,15 +45,22 @@ std::string name_in(const std::map<std::string, Enum>& names, const std::string&
   return number;
 }
 
-std::string value_of(const CLI::Option& option) {
+// No values if the option has no default either.
+std::vector<std::string> values_of(const CLI::Option& option) {
   const bool is_flag = option.get_expected_max() == 0;
-  if (option.count() == 0) return is_flag ? "false" : option.get_default_str();
-  const std::string value = CLI::detail::join(option.reduced_results(), ",");
+  if (option.count() == 0) {
+    const std::string standard = is_flag ? "false" : option.get_default_str();
+    return standard.empty() ? std::vector<std::string>() : std::vector{standard};
+  }
+  std::vector<std::string> values = option.reduced_results();
   const std::string& name = option.get_lnames().front();
-  if (name == "log-level") return name_in(kLogLevels, value);
-  if (name == "log-format") return name_in(kLogFormats, value);
-  if (name == "proxy-header") return name_in(kProxyHeaders, value);
-  return value;
+  for (std::string& value : values) {
+    if (name == "log-level") value = name_in(kLogLevels, value);
+    if (name == "log-format") value = name_in(kLogFormats, value);
+    if (name == "proxy-header") value = name_in(kProxyHeaders, value);
+  }
+  std::erase(values, "");
+  return values;
 }
 
 // CLI::CheckedTransformer, but its error lists only the names.
@@ -108,8 +115,8 @@ std::string wrong_origin(const std::string& text) {
 }
 
 std::string wrong_host(const std::string& text) {
-  const bool is_name = !text.empty() && text.find_first_of(" \t/") == std::string::npos;
-  return is_name ? "" : '"' + text + "\" is not a host name";
+  const bool is_name = text.find_first_of(" \t/") == std::string::npos;
+  return is_name && !http::host_named(text).empty() ? "" : '"' + text + "\" is not a host name";
 }
 
 std::string wrong_proxy(const std::string& text) {
@@ -150,19 +157,23 @@ Limits one_name_of(const std::map<std::string, Enum>& names, const char* standar
   };
 }
 
-// Separated by commas.
+// Each time that the option is given, it has values separated by commas. No value has one.
 Limits many(std::string (*fault_of)(const std::string&)) {
-  return [=](CLI::Option& option) { option.check(CLI::Validator(fault_of, ""))->delimiter(','); };
+  return [=](CLI::Option& option) {
+    option.check(CLI::Validator(fault_of, ""))->delimiter(',')->allow_extra_args(false);
+  };
 }
 
 Limits typed(const char* type) {
   return [=](CLI::Option& option) { option.type_name(type); };
 }
 
-// Each time that the option is given, it has values separated by commas.
+// Each time that the option is given, it has one value, which may have commas, as distinguished
+// names and URLs do. A variable of the environment has one value a line.
 Limits repeated(const char* type) {
-  return
-      [=](CLI::Option& option) { option.type_name(type)->delimiter(',')->allow_extra_args(false); };
+  return [=](CLI::Option& option) {
+    option.type_name(type)->delimiter('\n')->allow_extra_args(false);
+  };
 }
 
 void no_limits(CLI::Option& /*option*/) {}
@@ -384,13 +395,13 @@ std::string as_config(const CLI::App& cli, Remarks remarks) {
   }
   for (const CLI::Option* option : cli.get_options()) {
     if (!option->get_configurable() || option->get_lnames().empty()) continue;
-    const std::string value = value_of(*option);
+    const std::vector<std::string> values = values_of(*option);
     // An empty value without a default is none.
     const bool is_set =
-        option->count() > 0 && !(value.empty() && option->get_default_str().empty());
+        option->count() > 0 && !(values.empty() && option->get_default_str().empty());
     if (remarks == Remarks::kYes) text += "# " + option->get_description() + ".\n";
     text += (is_set ? "" : "# ") + option->get_lnames().front();
-    text += " = " + as_toml(*option, value) + '\n';
+    text += " = " + as_toml(*option, values) + '\n';
     if (remarks == Remarks::kYes) text += '\n';
   }
   return text;

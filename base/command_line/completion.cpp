@@ -5,18 +5,24 @@
 namespace isomesh::command_line {
 namespace {
 
-// % is the program's name.
+// % is the program's name. Candidates may be a server's words, so the scripts compare them and
+// never expand them, as `compgen -W` does.
 constexpr std::string_view kBash = R"sh(# bash completion of %; made by `% completion bash`.
 _%() {
-  local word="${COMP_WORDS[COMP_CWORD]}" program="${COMP_WORDS[0]/#\~/$HOME}" found
-  found="$(command "$program" complete "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null)"
-  if [[ "$found" == :files ]]; then
-    COMPREPLY=($(compgen -f -- "$word"))
-  else
-    COMPREPLY=($(compgen -W "$(cut -f 1 <<<"$found")" -- "$word"))
+  local word="${COMP_WORDS[COMP_CWORD]}" program="${COMP_WORDS[0]/#\~/$HOME}" each
+  local -a found
+  mapfile -t found < <(command "$program" complete "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null | cut -f 1)
+  COMPREPLY=()
+  if [[ "${found[0]-}" == :files ]]; then
+    compopt -o filenames 2>/dev/null
+    mapfile -t COMPREPLY < <(compgen -f -- "$word")
+    return
   fi
+  for each in "${found[@]}"; do
+    if [[ "$each" == "$word"* ]]; then COMPREPLY+=("$each"); fi
+  done
 }
-complete -o filenames -F _% %
+complete -F _% %
 )sh";
 
 constexpr std::string_view kZsh = R"sh(#compdef %

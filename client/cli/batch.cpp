@@ -15,6 +15,7 @@
 #include "client/cli/options.h"
 #include "client/isomesh/package.h"
 #include "proto/error.h"
+#include "proto/volume_formats.h"
 
 namespace isomesh::cli {
 namespace {
@@ -50,10 +51,25 @@ bool belongs_to_another(const std::vector<std::vector<fs::path>>& sent, std::siz
   return false;
 }
 
+constexpr std::string_view kPacked = ".gz .bz2 .xz .zip .tar .tgz";
+
+// Removes the suffix of these that the name has, if more than that remains.
+bool drop_suffix(std::string& name, std::string_view suffixes) {
+  for (const std::string_view suffix : words(suffixes)) {
+    if (name.size() <= suffix.size() || !lower(name).ends_with(lower(suffix))) continue;
+    name.resize(name.size() - suffix.size());
+    return true;
+  }
+  return false;
+}
+
+// Without the suffixes of volumes. What else follows a dot is part of a name: of a version, a UID.
 fs::path without_suffixes(const fs::path& path) {
-  const std::string suffix = lower(path.extension().string());
-  const bool is_packed = suffix == ".gz" || suffix == ".bz2" || suffix == ".xz";
-  return path.parent_path() / (is_packed ? path.stem() : path).stem();
+  std::string name = path.filename().string();
+  while (drop_suffix(name, kPacked)) continue;
+  const auto drops = [&](const VolumeFormat& format) { return drop_suffix(name, format.suffixes); };
+  static_cast<void>(std::ranges::any_of(volume_formats(), drops));
+  return path.parent_path() / name;
 }
 
 // `name` in a file's name, which stays in its folder. An archive may name its members anyhow.
@@ -179,24 +195,13 @@ void give_names(std::vector<Input>& inputs) {
 }
 
 // Rejects in advance what would fail after the uploads.
-void refuse_clashes(const std::vector<Input>& inputs, const std::vector<Output>& outputs) {
-  const bool needs_folder = std::ranges::any_of(
+void expect_folders(const std::vector<Input>& inputs, const std::vector<Output>& outputs) {
+  const bool are_needed = std::ranges::any_of(
       outputs, [](const Output& output) { return has_folder(output.path.string()); });
-  std::map<fs::path, fs::path> writers;
   for (const Input& input : inputs) {
-    const fs::path& own = input.files.front();
-    if (needs_folder && input.names.folder.empty()) {
-      wrong_usage("-o: " + own.string() + " is in no folder that {folder} could stand for");
-    }
-    for (const Output& output : filled(outputs, input.names)) {
-      const auto [writer, is_first] = writers.try_emplace(output.path.lexically_normal(), own);
-      if (is_first || writer->second == own) continue;
-      wrong_usage("-o: " + writer->second.string() + " and " + own.string() +
-                  " would both be written to " + output.path.string() +
-                  (has_folder(output.path.string())
-                       ? ""
-                       : "; use {folder} and {name}, or give them in two runs"));
-    }
+    if (!are_needed || !input.names.folder.empty()) continue;
+    wrong_usage("-o: " + input.files.front().string() +
+                " is in no folder that {folder} could stand for");
   }
 }
 
@@ -280,15 +285,6 @@ std::vector<OutputNames> names_of_members(const OutputNames& input,
   return all;
 }
 
-bool TakenOutputs::take(const std::vector<Output>& outputs) {
-  const std::scoped_lock lock(mutex_);
-  for (const Output& output : outputs) {
-    if (paths_.contains(output.path.lexically_normal())) return false;
-  }
-  for (const Output& output : outputs) paths_.insert(output.path.lexically_normal());
-  return true;
-}
-
 std::vector<Input> inputs_of(const Options& options) {
   const auto& files = options.files;
   if (!is_by_name(options.outputs)) return {{files, {name_of_input(files.front())}}};
@@ -300,7 +296,7 @@ std::vector<Input> inputs_of(const Options& options) {
     if (!belongs_to_another(sent, n)) inputs.push_back({{files[n]}, {}});
   }
   give_names(inputs);
-  refuse_clashes(inputs, options.outputs);
+  expect_folders(inputs, options.outputs);
   return inputs;
 }
 
@@ -332,12 +328,11 @@ std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs) {
   return formats;
 }
 
-bool is_up_to_date(const Input& input, const std::vector<Output>& outputs) {
+bool is_up_to_date(const Input& input, const std::vector<fs::path>& files) {
   const std::optional<fs::file_time_type> newest = newest_of(input);
-  return newest && !outputs.empty() && std::ranges::all_of(outputs, [&](const Output& output) {
+  return newest && !files.empty() && std::ranges::all_of(files, [&](const fs::path& file) {
            std::error_code absent;
-           return fs::is_regular_file(output.path, absent) &&
-                  fs::last_write_time(output.path, absent) > *newest;
+           return fs::is_regular_file(file, absent) && fs::last_write_time(file, absent) > *newest;
          });
 }
 

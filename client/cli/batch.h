@@ -2,8 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -40,21 +38,9 @@ std::vector<std::string> names_of_members(const std::string& input,
 std::vector<OutputNames> names_of_members(const OutputNames& input,
                                           const std::vector<std::string>& members);
 
-// The outputs of one run. Thread safe.
-class TakenOutputs {
- public:
-  // False if one of these files belongs to another mesh.
-  bool take(const std::vector<Output>& outputs);
-
- private:
-  std::mutex mutex_;
-  std::set<std::filesystem::path> paths_;
-};
-
 // If outputs are named after inputs, each file is one input, without those that belong to another
 // file, such as the data of a header. Otherwise all files are one input. Inputs are named as
-// members are, but without numbers. Throws EarlyExit if two inputs would write the same output, or
-// an input has no folder for "{folder}".
+// members are, but without numbers. Throws EarlyExit if an input has no folder for "{folder}".
 std::vector<Input> inputs_of(const Options& options);
 
 // True if outputs are named after inputs: one of them has "{name}" or "{folder}" in it.
@@ -73,8 +59,8 @@ std::vector<Output> filled(const std::vector<Output>& outputs, const OutputNames
 // The formats of the outputs, each once, in the order of the outputs.
 std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs);
 
-// True if every output is a file that is newer than all files of the input. A stored volume never
-// changes, and standard input has no time.
-bool is_up_to_date(const Input& input, const std::vector<Output>& outputs);
+// True if every file of the outputs is there and newer than all files of the input. A stored volume
+// never changes, and standard input has no time.
+bool is_up_to_date(const Input& input, const std::vector<std::filesystem::path>& files);
 
 }  // namespace isomesh::cli

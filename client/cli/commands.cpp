@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <iostream>
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
+#include <thread>
 #include <utility>
 
 #include "client/cli/batch.h"
@@ -32,12 +35,12 @@ int upload(Client& client, const Options& options, const std::stop_token& stop) 
   const std::vector<UploadedVolume> volumes = upload_all(client, options, files, how, bar);
   const bool is_one = volumes.size() == 1 && volumes.front().volume;
   if (options.json) {
-    std::cout << (is_one ? to_json(*volumes.front().volume) : to_json(volumes)) << '\n';
+    print_json(is_one ? to_json(*volumes.front().volume) : to_json(volumes));
   }
   int status = kDone;
   for (const UploadedVolume& each : volumes) {
     // The bare id, for `$(isomesh upload ...)`.
-    if (each.volume && !options.json) std::cout << each.volume->id << '\n';
+    if (each.volume && !options.json) print(each.volume->id + '\n');
     if (!each.problem) continue;
     const Error error = to_error(*each.problem);
     complain(error.with_detail(each.member + ": " + error.what()));
@@ -54,23 +57,20 @@ JobParameters parameters_of(const Options& options, Client& client) {
 
 int estimate(Client& client, const Options& options) {
   const Estimate estimate = client.estimate(parameters_of(options, client));
-  std::cout << (options.json ? to_json(estimate) + '\n' : estimate_report(estimate));
+  options.json ? print_json(to_json(estimate)) : print(estimate_report(estimate));
   return kDone;
 }
 
 int submit(Client& client, const Options& options) {
   const Job job = client.submit(parameters_of(options, client), options.key);
-  std::cout << (options.json ? to_json(job) : job.id) << '\n';
+  options.json ? print_json(to_json(job)) : print(job.id + '\n');
   return kDone;
 }
 
 void show(Client& client, const Job& job, bool json) {
-  if (json) {
-    std::cout << to_json(job) << '\n';
-    return;
-  }
+  if (json) return print_json(to_json(job));
   const LengthUnit unit = job.mesh ? unit_of(client, job) : length_unit({});
-  std::cout << job_report(with_labels(client, job), unit);
+  print(job_report(with_labels(client, job), unit));
 }
 
 // Returns 0 for every state of the job.
@@ -102,16 +102,16 @@ int fetch(Client& client, const Options& options) {
   const std::vector<Output> outputs = filled(options.outputs, {id});
   const Job job = client.job(id);
   if (job.state == JobState::kSucceeded && !has_mesh(job, options)) {
-    if (options.json) std::cout << job_json(job, {}, {}) << '\n';
+    if (options.json) print_json(job_json(job, {}, {}));
     return status_of(job, options, {}, range_of(client, job));
   }
   const auto start = std::chrono::steady_clock::now();
   for (const Output& output : outputs) fetch(client, id, output, bar, options.label);
   const ClientTiming seen{.download = milliseconds_since(start)};
   if (options.json) {
-    std::cout << job_json(job, paths_of(job, outputs, options.label), seen) << '\n';
+    print_json(job_json(job, paths_of(job, outputs, options.label), seen));
   } else if (job.mesh && !options.quiet) {
-    std::cout << outputs_report(job, outputs, options.label);
+    print(outputs_report(job, outputs, options.label));
   }
   return kDone;
 }
@@ -125,12 +125,12 @@ void erase_job(Client& client, const std::string& id) {
 }
 
 int report(Client& client, const Options& options) {
-  const std::string text = client.report(job_id(client, options.id)) + '\n';
+  const std::string text = client.report(job_id(client, options.id));
   if (options.report.empty() || options.report == "-") {
-    std::cout << text;
+    print_json(text);
   } else {
     PartFile file(options.report);
-    file.write(text);
+    file.write(text + '\n');
     file.publish();
   }
   return kDone;
@@ -157,10 +157,11 @@ int erase(Client& client, const Options& options) {
 int cancel(Client& client, const Options& options) {
   const Job job = client.cancel(job_id(client, options.id));
   if (options.json) {
-    std::cout << to_json(job) << '\n';
+    print_json(to_json(job));
   } else {
     // A job that had ended keeps its state, and one that runs takes a moment to stop.
-    std::cout << (is_final(job.state) ? to_string(job.state) : "stopping") << ' ' << job.id << '\n';
+    const auto state = is_final(job.state) ? to_string(job.state) : "stopping";
+    print(std::string(state) + ' ' + job.id + '\n');
   }
   return kDone;
 }
@@ -177,16 +178,17 @@ VolumeNames names_of_volumes(Client& client, const std::vector<Job>& jobs) {
 int list(Client& client, const Options& options) {
   if (options.volumes) {
     const auto volumes = client.volumes();
-    std::cout << (options.json ? to_json(volumes) + '\n' : volume_list(volumes));
+    options.json ? print_json(to_json(volumes)) : print(volume_list(volumes));
   } else {
     JobFilter filter = options.filter;
     if (!filter.volume.empty()) filter.volume = volume_id(client, filter.volume);
     const JobPage page = client.jobs(filter, options.cursor);
-    std::cout << (options.json ? to_json(page.jobs, page.next) + '\n'
-                               : job_list(page.jobs, names_of_volumes(client, page.jobs)));
-    if (!options.json && !page.next.empty()) {
-      std::cerr << "More: isomesh list --cursor " << page.next << '\n';
+    if (options.json) {
+      print_json(to_json(page.jobs, page.next));
+      return kDone;
     }
+    print(job_list(page.jobs, names_of_volumes(client, page.jobs)));
+    tell_next("isomesh list", page.next);
   }
   return kDone;
 }
@@ -194,24 +196,24 @@ int list(Client& client, const Options& options) {
 int info(Client& client, const Options& options) {
   const Volume volume = client.volume(volume_id(client, options.id));
   if (options.json) {
-    std::cout << to_json(volume) << '\n';
+    print_json(to_json(volume));
   } else {
     constexpr std::uint32_t kColumns = 64;
-    std::cout << volume_report(volume) << histogram_report(client.histogram(volume.id, kColumns));
+    print(volume_report(volume) + histogram_report(client.histogram(volume.id, kColumns)));
   }
   return kDone;
 }
 
 int labels(Client& client, const Options& options) {
   const VolumeLabels labels = client.labels(volume_id(client, options.id), options.background);
-  std::cout << (options.json ? to_json(labels) + '\n' : label_list(labels));
+  options.json ? print_json(to_json(labels)) : print(label_list(labels));
   return kDone;
 }
 
 int walls(Client& client, const Options& options) {
   const Job job = client.job(job_id(client, options.id));
   const std::vector<WallSummary> walls = client.job_walls(job.id);
-  std::cout << (options.json ? to_json(walls) + '\n' : wall_list(walls, unit_of(client, job)));
+  options.json ? print_json(to_json(walls)) : print(wall_list(walls, unit_of(client, job)));
   return kDone;
 }
 
@@ -230,14 +232,14 @@ int rename(Client& client, const Options& options) {
   const auto name = options.name.empty() ? std::nullopt : std::optional(options.name);
   const std::string id = volume_id(client, options.id);
   const Volume volume = renamed(client, id, name);
-  std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
+  options.json ? print_json(to_json(volume)) : print(volume.id + '\n');
   return kDone;
 }
 
 int reorient(Client& client, const Options& options) {
   const Volume volume = client.reorient_volume(volume_id(client, options.id), options.axes);
   tell_notes(volume, options, "");
-  std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
+  options.json ? print_json(to_json(volume)) : print(volume.id + '\n');
   return kDone;
 }
 
@@ -245,19 +247,33 @@ int ids(Client& client, const Options& options) {
   const std::vector<Candidate> all = options.added_ids != nullptr
                                          ? options.added_ids->newest(client)
                                          : ids_of(client, options.kind);
-  for (const Candidate& each : all) std::cout << each.id << '\n';
+  std::string lines;
+  for (const Candidate& each : all) lines += each.id + '\n';
+  print(lines);
   return kDone;
 }
 
-// For completions, which must be quick and say nothing on errors.
-Client quick_client(const Options& options, const std::stop_token& stop) {
-  return Client({.server = options.server,
+// For completions, which must be quick and say nothing on errors. A server that sends a byte now
+// and then is not silent, so the whole has a time limit, too.
+int complete(const Options& options, const std::stop_token& stop) {
+  constexpr std::chrono::seconds kLongest{3};
+  std::stop_source over;
+  const std::stop_callback interrupted(stop, [&over] { over.request_stop(); });
+  const std::jthread clock([&](const std::stop_token& done) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    const auto never = [] { return false; };
+    std::condition_variable_any().wait_for(lock, done, kLongest, never);
+    over.request_stop();
+  });
+  Client client({.server = options.server,
                  .token = options.token,
                  .authorities = options.authorities,
                  .connect_timeout = std::chrono::seconds{1},
                  .silence_timeout = std::chrono::seconds{2},
                  .retry_timeout = {},
-                 .stop = stop});
+                 .stop = over.get_token()});
+  return ids(client, options);
 }
 
 struct CommandRow {
@@ -265,26 +281,19 @@ struct CommandRow {
   int (*run)(Client& client, const Options& options);
 };
 
-constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
-                                  CommandRow{Command::kSubmit, submit},
-                                  CommandRow{Command::kStatus, status},
-                                  CommandRow{Command::kWait, wait},
-                                  CommandRow{Command::kFetch, fetch},
-                                  CommandRow{Command::kCancel, cancel},
-                                  CommandRow{Command::kRename, rename},
-                                  CommandRow{Command::kErase, erase},
-                                  CommandRow{Command::kReorient, reorient},
-                                  CommandRow{Command::kList, list},
-                                  CommandRow{Command::kInfo, info},
-                                  CommandRow{Command::kLabels, labels},
-                                  CommandRow{Command::kWalls, walls},
-                                  CommandRow{Command::kReport, report},
-                                  CommandRow{Command::kIds, ids}};
+constexpr std::array kCommands = {
+    CommandRow{Command::kEstimate, estimate}, CommandRow{Command::kSubmit, submit},
+    CommandRow{Command::kStatus, status},     CommandRow{Command::kWait, wait},
+    CommandRow{Command::kFetch, fetch},       CommandRow{Command::kCancel, cancel},
+    CommandRow{Command::kRename, rename},     CommandRow{Command::kErase, erase},
+    CommandRow{Command::kReorient, reorient}, CommandRow{Command::kList, list},
+    CommandRow{Command::kInfo, info},         CommandRow{Command::kLabels, labels},
+    CommandRow{Command::kWalls, walls},       CommandRow{Command::kReport, report}};
 
 int dispatch(const Options& options, const std::stop_token& stop) {
   if (options.command == Command::kMesh) return mesh(options, stop);
-  Client client =
-      options.command == Command::kIds ? quick_client(options, stop) : client_of(options, stop);
+  if (options.command == Command::kIds) return complete(options, stop);
+  Client client = client_of(options, stop);
   if (options.command == Command::kUpload) return upload(client, options, stop);
   if (options.added != nullptr) return options.added->run(client, options);
   return std::ranges::find(kCommands, options.command, &CommandRow::command)->run(client, options);

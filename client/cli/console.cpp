@@ -7,6 +7,7 @@
 
 #include <unistd.h>
 
+#include "base/text.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/report.h"
 #include "client/cli/text.h"
@@ -51,17 +52,42 @@ Client client_of(const Options& options, const std::stop_token& stop) {
   return Client(std::move(client));
 }
 
-void complain(const std::string& message) {
-  const std::scoped_lock lock(console_mutex());
-  std::cerr << "isomesh: " << printable_lines(message) << '\n';
+Client parting_client(const Options& options) {
+  return Client({.server = options.server,
+                 .token = options.token,
+                 .authorities = options.authorities,
+                 .connect_timeout = std::chrono::seconds{2},
+                 .silence_timeout = std::chrono::seconds{5},
+                 .retry_timeout = std::chrono::seconds{2}});
 }
+
+void print(const std::string& lines) {
+  const std::scoped_lock lock(console_mutex());
+  std::cout << printable_lines(lines) << std::flush;
+}
+
+void print_json(const std::string& json) {
+  const std::scoped_lock lock(console_mutex());
+  std::cout << with_escapes(json) << '\n' << std::flush;
+}
+
+void remark(const std::string& line) {
+  const std::scoped_lock lock(console_mutex());
+  std::cerr << printable_lines(line) << '\n';
+}
+
+void tell_next(const std::string& command, const std::string& cursor) {
+  if (!cursor.empty()) remark("More: " + command + " --cursor " + shell_word(cursor));
+}
+
+void complain(const std::string& message) { remark("isomesh: " + message); }
 
 void complain(const Error& error, const std::string& subject) {
   const std::string remedy = remedy_report(error.remedy());
   std::string text = subject + (subject.empty() ? "" : ": ") + in_options(error);
   if (is_busy(error)) text += "; try again later, or wait longer with --retry-seconds";
-  const std::scoped_lock lock(console_mutex());
-  std::cerr << "isomesh: " << printable_lines(text) << '\n' << remedy;
+  if (!remedy.empty()) text += '\n' + remedy.substr(0, remedy.size() - 1);
+  complain(text);
 }
 
 void suggest_local() {

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "client/cli/output_files.h"
 #include "client/cli/run_folder.h"
 #include "client/cli/text.h"
 
@@ -28,14 +29,6 @@ void fetch_to_pipe(Client& client, const std::string& id, const Output& output, 
     const std::string name = output.is_stdout() ? "standard output" : output.path.string();
     throw Error(ErrorCode::kInvalidParameter, name + " cannot be written to");
   }
-}
-
-// The file of materials that fetch() wrote beside an output; empty if there is none.
-std::filesystem::path materials_of(const Job& job, const Output& output,
-                                   std::optional<std::int64_t> label) {
-  const bool has_materials = job.parameters.labels && !label && output.format == MeshFormat::kObj;
-  if (!has_materials || output.is_stdout() || is_pipe(output.path)) return {};
-  return materials_beside(output.path);
 }
 
 // For a folder that -o names with a slash at its end, or through {folder}.
@@ -68,32 +61,20 @@ std::string outputs_report(const Job& job, const std::vector<Output>& outputs,
   std::string text;
   for (const Output& output : outputs) {
     if (output.is_stdout()) continue;
-    const auto file = job.mesh->files.find(output.format);
-    text += output.path.string();
-    if (file != job.mesh->files.end()) text += "  " + human_bytes(file->second.bytes);
-    text += '\n';
-    const std::filesystem::path materials = materials_of(job, output, label);
-    if (!materials.empty()) text += materials.string() + '\n';
+    const auto mesh = job.mesh->files.find(output.format);
+    for (const std::filesystem::path& file : paths_of(job, {output}, label)) {
+      text += file.string();
+      const bool has_size = file == output.path && mesh != job.mesh->files.end();
+      if (has_size) text += "  " + human_bytes(mesh->second.bytes);
+      text += '\n';
+    }
   }
   return text;
 }
 
-std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs) {
-  std::vector<std::filesystem::path> paths;
-  paths.reserve(outputs.size());
-  for (const Output& output : outputs) paths.push_back(output.path);
-  return paths;
-}
-
 std::vector<std::filesystem::path> paths_of(const Job& job, const std::vector<Output>& outputs,
                                             std::optional<std::int64_t> label) {
-  std::vector<std::filesystem::path> paths;
-  for (const Output& output : outputs) {
-    paths.push_back(output.path);
-    const std::filesystem::path materials = materials_of(job, output, label);
-    if (!materials.empty()) paths.push_back(materials);
-  }
-  return paths;
+  return files_of(outputs, job.parameters.labels && !label);
 }
 
 }  // namespace isomesh::cli

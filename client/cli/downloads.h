@@ -19,8 +19,7 @@ void fetch(Client& client, const std::string& id, const Output& output, Progress
 // The files with their sizes, one per line. `label`: the one that was fetched, if not all.
 std::string outputs_report(const Job& job, const std::vector<Output>& outputs,
                            std::optional<std::int64_t> label = std::nullopt);
-std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs);
-// With the materials that were written beside an OBJ.
+// All files that fetch() wrote.
 std::vector<std::filesystem::path> paths_of(const Job& job, const std::vector<Output>& outputs,
                                             std::optional<std::int64_t> label = std::nullopt);
 

@@ -35,16 +35,11 @@ std::vector<Candidate> volumes_of(Client& client) {
   return all;
 }
 
-std::vector<Candidate> jobs_of(Client& client, bool is_first_page) {
+std::vector<Candidate> candidates_of(const std::vector<Job>& jobs) {
   std::vector<Candidate> all;
-  std::string cursor;
-  do {
-    const JobPage page = client.jobs({}, cursor);
-    for (const Job& job : page.jobs) {
-      all.push_back({job.id, std::string(to_string(job.state)) + "  " + job.created});
-    }
-    cursor = page.next;
-  } while (!is_first_page && !cursor.empty());
+  for (const Job& job : jobs) {
+    all.push_back({job.id, std::string(to_string(job.state)) + "  " + job.created});
+  }
   return all;
 }
 
@@ -96,12 +91,12 @@ std::string volume_id(Client& client, const std::string& text) {
 }
 
 std::string job_id(Client& client, const std::string& text) {
-  return timed_id(text, "job", [&client] { return jobs_of(client, false); });
+  return timed_id(text, "job", [&client] { return candidates_of(client.all_jobs()); });
 }
 
 std::vector<Candidate> ids_of(Client& client, const std::string& kind) {
   if (kind == "volumes") return volumes_of(client);
-  return jobs_of(client, true);
+  return candidates_of(client.jobs().jobs);
 }
 
 }  // namespace isomesh::cli

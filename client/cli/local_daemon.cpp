@@ -37,7 +37,8 @@ fs::path find_program(const fs::path& given) {
   std::vector<fs::path> places = {own, own / "../sbin"};
   const char* path = std::getenv("PATH");
   for (const std::string_view folder : split(path == nullptr ? "" : path, ':')) {
-    places.emplace_back(folder);
+    // An empty one would be the working folder, which may have strangers' files.
+    if (!folder.empty()) places.emplace_back(folder);
   }
   for (const fs::path& place : places) {
     if (is_program(place / "isomeshd")) return (place / "isomeshd").lexically_normal();

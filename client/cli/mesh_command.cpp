@@ -3,14 +3,11 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
-#include <iostream>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <thread>
 #include <utility>
-
-#include <sys/stat.h>
 
 #include "base/ids.h"
 #include "client/cli/batch.h"
@@ -21,10 +18,10 @@
 #include "client/cli/ids.h"
 #include "client/cli/job_end.h"
 #include "client/cli/option_groups.h"
+#include "client/cli/output_files.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/report.h"
 #include "client/cli/uploads.h"
-#include "client/isomesh/package.h"
 #include "proto/json.h"
 #include "proto/notes.h"
 
@@ -32,17 +29,6 @@ namespace isomesh::cli {
 namespace {
 
 constexpr std::size_t kKeyBytes = 16;
-
-// For the last requests, also after an interrupt. The time limits are short, because the user
-// waits.
-Client parting_client(const Options& options) {
-  return Client({.server = options.server,
-                 .token = options.token,
-                 .authorities = options.authorities,
-                 .connect_timeout = std::chrono::seconds{2},
-                 .silence_timeout = std::chrono::seconds{5},
-                 .retry_timeout = std::chrono::seconds{2}});
-}
 
 // Cancels the job with that key, which may not have come to the server yet. `id` is empty if it is
 // not known.
@@ -60,9 +46,12 @@ void cancel_after_stop(const Options& options, const JobParameters& parameters,
   }
 }
 
-Error overwriting(const OutputNames& names, const std::string& member) {
+Error overwriting(const RunFiles::Clash& clash, const std::string& member) {
+  const std::string file = clash.file.string();
   return Error(ErrorCode::kInvalidParameter,
-               "two meshes would be called " + names.name + ": --member takes one of the volumes")
+               (clash.owner.empty() ? "the mesh would overwrite the volume " + file
+                                    : "two meshes would be written to " + file) +
+                   ": --member takes one of the volumes")
       .with_remedy({.choices = {{"member", member, ""}}});
 }
 
@@ -76,13 +65,6 @@ Error one_of(const std::vector<UploadedVolume>& volumes) {
   if (!are_labels) return error;
   return error.with_detail(std::string(error.what()) +
                            "; if they are masks, --masks makes one surface of each in one mesh");
-}
-
-// Writes to standard output. Thread safe.
-void print(const std::string& text) {
-  static std::mutex mutex;
-  const std::scoped_lock lock(mutex);
-  std::cout << text << std::flush;
 }
 
 // The volumes that a dry run has stored. They are deleted when all inputs have ended, because
@@ -121,7 +103,7 @@ class Leftovers {
 class MeshRun {
  public:
   MeshRun(const Options& options, const std::stop_token& stop, bool is_one_of_many,
-          TakenOutputs& taken, Leftovers& leftovers);
+          RunFiles& run_files, Leftovers& leftovers);
 
   // Returns the exit status. Throws Error as Client does, and Lost.
   int input(const Input& input);
@@ -142,11 +124,12 @@ class MeshRun {
   std::optional<Job> made(const JobParameters& parameters);
   void resumable(const std::string& job, const std::function<void()>& step);
   int dry_run(const JobParameters& parameters, const Task& task);
+  bool is_by_labels() const { return options_.parameters.labels.has_value(); }
   void report(const Job& job, const std::vector<Output>& outputs, const Task& task);
 
   const Options& options_;
   const std::stop_token stop_;
-  TakenOutputs& taken_;
+  RunFiles& run_files_;
   Leftovers& leftovers_;
   const bool is_one_of_many_;
   Client client_;
@@ -155,10 +138,10 @@ class MeshRun {
 };
 
 MeshRun::MeshRun(const Options& options, const std::stop_token& stop, bool is_one_of_many,
-                 TakenOutputs& taken, Leftovers& leftovers)
+                 RunFiles& run_files, Leftovers& leftovers)
     : options_(options),
       stop_(stop),
-      taken_(taken),
+      run_files_(run_files),
       leftovers_(leftovers),
       is_one_of_many_(is_one_of_many),
       client_(client_of(options, stop)),
@@ -187,7 +170,7 @@ int MeshRun::members(const Input& input, std::vector<UploadedVolume> volumes) {
   const auto refuse = [&](const Error& error, const UploadedVolume& which) {
     const Task task = task_of(input, input.names, which.member);
     complain(error, task.subject);
-    if (options_.json) print(failure_json(error, task.origin) + '\n');
+    if (options_.json) print_json(failure_json(error, task.origin));
     status = std::max(status, status_of(error));
   };
   for (const UploadedVolume& each : volumes) {
@@ -202,10 +185,13 @@ int MeshRun::members(const Input& input, std::vector<UploadedVolume> volumes) {
     const UploadedVolume& each = volumes[n];
     const std::vector<Output> outputs = filled(options_.outputs, names[n]);
     try {
-      if (!taken_.take(outputs)) throw overwriting(names[n], each.member);
       const Task task = task_of(input, names[n], each.member);
-      if (options_.skip_existing && is_up_to_date(input, outputs)) {
-        if (options_.json) print(skipped_json(paths_of(outputs), task.origin) + '\n');
+      if (const auto clash = run_files_.take(outputs, task.subject)) {
+        throw overwriting(*clash, each.member);
+      }
+      const std::vector<std::filesystem::path> files = files_of(outputs, is_by_labels());
+      if (options_.skip_existing && is_up_to_date(input, files)) {
+        if (options_.json) print_json(skipped_json(files, task.origin));
         if (!options_.quiet) complain(task.subject + ": skipped: its mesh is newer");
         continue;
       }
@@ -248,7 +234,7 @@ int MeshRun::mesh(const Volume& volume, const Task& task) {
   const std::optional<Job> job = made(parameters);
   if (!job) return kRefused;
   if (!has_mesh(*job, options_)) {
-    if (options_.json) print(job_json(*job, {}, seen_, task.origin) + '\n');
+    if (options_.json) print_json(job_json(*job, {}, seen_, task.origin));
     return status_of(*job, options_, task.subject, volume.range);
   }
   const auto downloading = std::chrono::steady_clock::now();
@@ -293,13 +279,13 @@ void MeshRun::resumable(const std::string& job, const std::function<void()>& ste
 int MeshRun::dry_run(const JobParameters& parameters, const Task& task) {
   const Estimate estimate = client_.estimate(parameters);
   const std::string title = task.subject.empty() ? "" : task.names.name + '\n';
-  print(options_.json ? with_origin(to_json(estimate), task.origin) + '\n'
-                      : title + estimate_report(estimate));
+  options_.json ? print_json(with_origin(to_json(estimate), task.origin))
+                : print(title + estimate_report(estimate));
   return kDone;
 }
 
 void MeshRun::report(const Job& job, const std::vector<Output>& outputs, const Task& task) {
-  if (options_.json) return print(job_json(job, paths_of(job, outputs), seen_, task.origin) + '\n');
+  if (options_.json) return print_json(job_json(job, paths_of(job, outputs), seen_, task.origin));
   const bool has_mesh_on_stdout = std::ranges::any_of(outputs, &Output::is_stdout);
   if (options_.quiet || has_mesh_on_stdout) return;
   std::string text = outputs_report(job, outputs);
@@ -312,7 +298,7 @@ void MeshRun::report(const Job& job, const std::vector<Output>& outputs, const T
 }
 
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
-             TakenOutputs& taken, Leftovers& leftovers) {
+             RunFiles& run_files, Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;
   std::atomic<int> worst = kDone;
   std::atomic<std::size_t> failed = 0;
@@ -320,12 +306,12 @@ int mesh_all(const Options& options, const std::vector<Input>& inputs, const std
   const auto fail = [&](const Error& error, const Input& input) {
     complain(error, input.names.name);
     if (options.json) {
-      print(failure_json(error, {.input = input.files.front().string()}) + '\n');
+      print_json(failure_json(error, {.input = input.files.front().string()}));
     }
     return status_of(error);
   };
   const auto work = [&] {
-    MeshRun run(options, stop, true, taken, leftovers);
+    MeshRun run(options, stop, true, run_files, leftovers);
     for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
       int status = kDone;
       try {
@@ -356,41 +342,15 @@ int mesh_all(const Options& options, const std::vector<Input>& inputs, const std
   return worst;
 }
 
-// A mesh must not replace a file of a volume: .vtk, for one, is a format of both.
-void refuse_to_overwrite(const std::vector<Input>& inputs, const Options& options) {
-  std::set<std::pair<dev_t, ino_t>> sent;
-  struct stat status = {};
-  for (const Input& input : inputs) {
-    for (const std::filesystem::path& path : input.files) {
-      std::error_code absent;
-      if (!std::filesystem::exists(path, absent)) continue;  // standard input, or a stored volume
-      try {
-        for (const PackedFile& file : files_of_upload(path)) {
-          if (::stat(file.path.c_str(), &status) == 0) sent.emplace(status.st_dev, status.st_ino);
-        }
-      } catch (const Error&) {
-        // The upload of this input tells it.
-      }
-    }
-  }
-  for (const Input& input : inputs) {
-    for (const Output& output : filled(options.outputs, input.names)) {
-      if (::stat(output.path.c_str(), &status) != 0) continue;
-      if (sent.contains({status.st_dev, status.st_ino})) {
-        wrong_usage("-o: the mesh would overwrite the volume " + output.path.string());
-      }
-    }
-  }
-}
-
 // Leaves out the inputs whose outputs are newer.
 void skip_existing(std::vector<Input>& inputs, const Options& options) {
   const std::size_t all = inputs.size();
   std::erase_if(inputs, [&](const Input& input) {
-    const std::vector<Output> outputs = filled(options.outputs, input.names);
-    if (!is_up_to_date(input, outputs)) return false;
+    const std::vector<std::filesystem::path> files =
+        files_of(filled(options.outputs, input.names), options.parameters.labels.has_value());
+    if (!is_up_to_date(input, files)) return false;
     if (options.json) {
-      print(skipped_json(paths_of(outputs), {.input = input.files.front().string()}) + '\n');
+      print_json(skipped_json(files, {.input = input.files.front().string()}));
     }
     return true;
   });
@@ -403,16 +363,13 @@ void skip_existing(std::vector<Input>& inputs, const Options& options) {
 
 int mesh(const Options& options, const std::stop_token& stop) {
   std::vector<Input> inputs = inputs_of(options);
-  refuse_to_overwrite(inputs, options);
+  RunFiles run_files(options, inputs);
   const bool is_one = inputs.size() == 1;
-  // An archive's members are known after its upload; by then other inputs have their names.
-  TakenOutputs taken;
-  for (const Input& input : inputs) taken.take(filled(options.outputs, input.names));
   if (options.skip_existing) skip_existing(inputs, options);
   if (inputs.empty()) return kDone;
   Leftovers leftovers(options);
-  if (!is_one) return mesh_all(options, inputs, stop, taken, leftovers);
-  return MeshRun(options, stop, false, taken, leftovers).input(inputs.front());
+  if (!is_one) return mesh_all(options, inputs, stop, run_files, leftovers);
+  return MeshRun(options, stop, false, run_files, leftovers).input(inputs.front());
 }
 
 }  // namespace isomesh::cli

@@ -486,7 +486,7 @@ bool is_pipe(const std::filesystem::path& path) {
 }
 
 void wrong_usage(const std::string& message) {
-  throw EarlyExit(kWrongUsage, "isomesh: " + message + '\n');
+  throw EarlyExit(kWrongUsage, "isomesh: " + printable_lines(message) + '\n');
 }
 
 Options parse_options(int argc, const char* const* argv, const Added& added) {

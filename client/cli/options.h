@@ -96,7 +96,7 @@ class EarlyExit : public std::runtime_error {
   int status_;
 };
 
-// Throws EarlyExit with kWrongUsage and "isomesh: `message`".
+// Throws EarlyExit with kWrongUsage and "isomesh: `message`", printable but for line breaks.
 [[noreturn]] void wrong_usage(const std::string& message);
 
 // Reads the arguments, and ISOMESH_SERVER and ISOMESH_TOKEN of the environment. `added` must

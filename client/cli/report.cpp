@@ -305,13 +305,15 @@ std::string remedy_report(const Remedy& remedy) {
   Rows rows;
   for (const Choice& choice : remedy.choices) {
     if (rows.size() == kMost) break;
-    rows.push_back({"  --" + choice.parameter + ' ' + choice.value, choice.title});
+    // A shell takes the whole line, whose title is a comment.
+    rows.push_back({"  " + shell_word("--" + choice.parameter) + ' ' + shell_word(choice.value),
+                    choice.title.empty() ? "" : "# " + choice.title});
   }
   if (remedy.choices.size() > kMost) {
     rows.push_back({"  and " + std::to_string(remedy.choices.size() - kMost) + " more"});
   }
   std::string text = rows.empty() ? "" : in_columns({Align::kLeft, Align::kLeft}, rows);
-  if (!remedy.overridable.empty()) text += "  --accept " + printable(remedy.overridable) + '\n';
+  if (!remedy.overridable.empty()) text += "  --accept " + shell_word(remedy.overridable) + '\n';
   return text;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "base/hex.h"
 #include "base/text.h"
 
 namespace isomesh::cli {
@@ -77,14 +78,31 @@ std::string in_columns(const std::vector<Align>& columns,
   return text;
 }
 
-std::string printable_lines(std::string_view text) {
-  std::string lines;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    lines += (begin == 0 ? "" : "\n") + printable(text.substr(begin, end - begin));
-    begin = end + 1;
+std::string with_escapes(std::string_view json) {
+  std::string text;
+  const auto escape = [&](char byte) { text += "\\u00" + to_hex(std::string_view(&byte, 1)); };
+  for (std::size_t at = 0; at < json.size(); ++at) {
+    const unsigned next = at + 1 < json.size() ? static_cast<unsigned char>(json[at + 1]) : 0;
+    if (json[at] == '\x7F') {
+      escape(json[at]);
+    } else if (json[at] == '\xC2' && next >= 0x80 && next < 0xA0) {
+      escape(json[++at]);
+    } else {
+      text += json[at];
+    }
   }
-  return lines;
+  return text;
+}
+
+std::string shell_word(std::string_view text) {
+  const std::string word = printable(text);
+  const auto is_word = [](char c) {
+    return is_plain(c) || std::string_view("/,:+@%").find(c) != std::string_view::npos;
+  };
+  if (!word.empty() && std::ranges::all_of(word, is_word)) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  return quoted + '\'';
 }
 
 std::string with_options(std::string text) {

@@ -26,8 +26,13 @@ enum class Align { kLeft, kRight };
 std::string in_columns(const std::vector<Align>& columns,
                        std::vector<std::vector<std::string>> rows);
 
-// The text without control characters, except line breaks.
-std::string printable_lines(std::string_view text);
+// JSON with \\u escapes for the control characters that it may have as they are, which some
+// terminals obey: U+007F to U+009F.
+std::string with_escapes(std::string_view json);
+
+// A word for a line that a person may copy to a shell: as it is, or in quotes if a shell would take
+// it for something else. Control characters are replaced.
+std::string shell_word(std::string_view text);
 
 // A text of the server, in which the command's options replace the API's parameters: "--member
 // NAME" for "member=NAME".

@@ -97,10 +97,9 @@ class Patience {
 
   // Call with each answer of the server.
   void hear(std::uint64_t offset) {
-    if (offset > reached_) {
-      cut_at_.reset();
-      backoff_.restart();
-    }
+    if (offset <= reached_) return;  // also one that was reached before, and lost
+    cut_at_.reset();
+    backoff_.restart();
     reached_ = offset;
   }
 

@@ -19,9 +19,9 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// A job's JSON has a few kilobytes, so a longer line is not an event.
 constexpr int kNoContent = 204;
-constexpr std::size_t kLongestLine = 1024 * 1024;
+// A job's JSON has a few kilobytes, so more is not an event.
+constexpr std::size_t kLongestEvent = 1024 * 1024;
 
 // Parses a job's stream of server-sent events incrementally. Not thread safe.
 class EventReader {
@@ -34,7 +34,7 @@ class EventReader {
     while (!piece.empty()) {
       const std::size_t end = piece.find('\n');
       line_ += piece.substr(0, end);
-      if (line_.size() > kLongestLine) {
+      if (line_.size() + data_.size() > kLongestEvent) {
         throw Error(ErrorCode::kInternal, "the server's events do not match the API");
       }
       if (end == std::string_view::npos) return;
@@ -121,13 +121,12 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
 // Writes a mesh as it arrives and checks it against the job's size and digest. Not thread safe.
 class Download {
  public:
-  Download(MeshFile announced, const std::filesystem::path& target, MeshFormat format,
+  // `files`: those of files_of_mesh().
+  Download(MeshFile announced, const std::vector<std::filesystem::path>& files, Existing existing,
            const TransferProgress& progress)
       : announced_(std::move(announced)),
-        file_(target),
-        materials_(format == MeshFormat::kObj && lower(target.extension().string()) == ".obj"
-                       ? materials_beside(target)
-                       : ""),
+        file_(files.front(), PartFile::Until::kUnnamed, existing),
+        materials_(files.size() > 1 ? files.back() : ""),
         progress_(progress) {}
 
   // The request headers to resume a download; none if nothing has arrived.
@@ -205,18 +204,33 @@ class Download {
   std::uint64_t received_ = 0;
 };
 
+constexpr const char* kJobs = "/v1/jobs";
+
 std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_segment(id); }
-std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(id); }
+std::string job_path(const std::string& id) { return std::string(kJobs) + '/' + path_segment(id); }
+
+Query query_of(const JobFilter& filter) {
+  Query query;
+  if (filter.state) query.emplace_back("state", to_string(*filter.state));
+  if (!filter.volume.empty()) query.emplace_back("volume", filter.volume);
+  if (!filter.since.empty()) query.emplace_back("since", filter.since);
+  if (!filter.until.empty()) query.emplace_back("until", filter.until);
+  return query;
+}
 
 }  // namespace
 
-std::filesystem::path materials_beside(const std::filesystem::path& obj) {
-  const std::filesystem::path file = behind_links(obj);
+std::vector<std::filesystem::path> files_of_mesh(const std::filesystem::path& target,
+                                                 MeshFormat format, bool is_by_labels) {
+  const bool has_materials =
+      is_by_labels && format == MeshFormat::kObj && lower(target.extension().string()) == ".obj";
+  if (!has_materials) return {target};
+  const std::filesystem::path file = behind_links(target);
   std::string name = file.filename().replace_extension(".mtl").string();
   // Readers take several names from the line, divided by blanks, and control characters end it.
   std::ranges::replace_if(
       name, [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\\'; }, '_');
-  return file.parent_path() / name;
+  return {target, file.parent_path() / name};
 }
 
 Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
@@ -298,7 +312,7 @@ Job Client::submit(const JobParameters& parameters, const std::string& idempoten
   const std::string key = idempotency_key.empty() ? random_hex(kKeyBytes) : idempotency_key;
   return job_from_json(
       impl_->repeat({.method = "POST",
-                     .target = "/v1/jobs",
+                     .target = kJobs,
                      .headers = {{"Content-Type", "application/json"}, {"Idempotency-Key", key}},
                      .body = to_json(parameters)}));
 }
@@ -313,14 +327,12 @@ Job Client::job(const std::string& id, seconds wait) {
 }
 
 JobPage Client::jobs(const JobFilter& filter, const std::string& cursor) {
-  Query query;
-  if (filter.state) query.emplace_back("state", to_string(*filter.state));
-  if (!filter.volume.empty()) query.emplace_back("volume", filter.volume);
-  if (!filter.since.empty()) query.emplace_back("since", filter.since);
-  if (!filter.until.empty()) query.emplace_back("until", filter.until);
-  if (!cursor.empty()) query.emplace_back("cursor", cursor);
-  const std::string body = impl_->repeat({.target = "/v1/jobs" + query_string(query)});
+  const std::string body = impl_->page(kJobs, query_of(filter), cursor);
   return {.jobs = jobs_from_json(body), .next = next_from_json(body)};
+}
+
+std::vector<Job> Client::all_jobs(const JobFilter& filter) {
+  return impl_->all_pages(kJobs, jobs_from_json, query_of(filter));
 }
 
 Job Client::cancel(const std::string& id) {
@@ -375,12 +387,15 @@ std::string Client::report(const std::string& id) {
 }
 
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
-                   const TransferProgress& progress, std::optional<std::int64_t> label) {
+                   const TransferProgress& progress, std::optional<std::int64_t> label,
+                   Existing existing) {
   Job done = job(id);
   if (done.mesh && done.mesh->labels_count && (label || !done.mesh->files.contains(format))) {
     done.mesh->labels = job_labels(id);
   }
-  Download download(file_of(done, format, label), target, format, progress);
+  const bool is_by_labels = done.parameters.labels && !label;
+  Download download(file_of(done, format, label), files_of_mesh(target, format, is_by_labels),
+                    existing, progress);
   HttpRequest request{.target = mesh_path(path_segment(id), format, label)};
   request.sink = [&](std::string_view piece) { download.take(piece); };
   request.before_sink = [&](int status) { download.begin(status); };
@@ -388,7 +403,7 @@ void Client::fetch(const std::string& id, MeshFormat format, const std::filesyst
   download.check();
   std::optional<PartFile> materials;
   if (const std::filesystem::path place = download.materials(); !place.empty()) {
-    materials.emplace(place);
+    materials.emplace(place, PartFile::Until::kUnnamed, existing);
     materials->write(impl_->repeat({.target = job_path(id) + '/' + std::string(kMaterialsName)}));
     materials->sync();
   }

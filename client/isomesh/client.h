@@ -97,10 +97,16 @@ Error several_volumes(const std::vector<UploadedVolume>& volumes);
 
 using JobListener = std::function<void(const JobEvent& event)>;
 
-// The file of materials that Client::fetch() writes beside an OBJ of labels: for `x.obj` it is
-// `x.mtl`, with `_` for blanks, backslashes and control characters, which no name in an OBJ may
-// have. Follows links.
-std::filesystem::path materials_beside(const std::filesystem::path& obj);
+// Every file that Client::fetch() writes for `target`. First the mesh, then the materials of an OBJ
+// of all labels whose suffix is .obj: for `x.obj` they are `x.mtl`, with `_` for blanks,
+// backslashes and control characters, which no name in an OBJ may have. They lie beside the file
+// that a link leads to. Throws Error kInvalidParameter for a loop of links.
+std::vector<std::filesystem::path> files_of_mesh(const std::filesystem::path& target,
+                                                 MeshFormat format, bool is_by_labels);
+
+// The treatment of a file that is there already, or appears meanwhile. kRefuse fails with
+// kInvalidParameter, also for a link.
+enum class Existing { kReplace, kRefuse };
 
 // The jobs that a list has; all if it is empty.
 struct JobFilter {
@@ -187,6 +193,8 @@ class Client {
   Job job(const std::string& id, std::chrono::seconds wait);
   // A page of the jobs that match, newest first: the first page, or the one of `cursor`.
   JobPage jobs(const JobFilter& filter = {}, const std::string& cursor = {});
+  // All jobs that match, newest first.
+  std::vector<Job> all_jobs(const JobFilter& filter = {});
   // Returns the job. One that had ended keeps its state, and one that runs takes a moment to stop.
   Job cancel(const std::string& id);
   // Erases an ended job and its files, and returns nothing; cancels any other and returns it.
@@ -215,11 +223,12 @@ class Client {
   // SHA-256 that the job states. Resumes after a broken connection. Throws kNotReady if the job has
   // not ended, the job's own error if it failed, kCancelled if it was cancelled, kNotFound if it
   // has no file of that format, kDigestMismatch for wrong bytes. For a job by labels, `label`
-  // selects one label's own surface. An OBJ of all labels, written to a file with the suffix .obj,
-  // gets the file materials_beside() says, and names it.
+  // selects one label's own surface. Writes the files that files_of_mesh() names, and an OBJ names
+  // its materials so.
   void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
              const TransferProgress& progress = {},
-             std::optional<std::int64_t> label = std::nullopt);
+             std::optional<std::int64_t> label = std::nullopt,
+             Existing existing = Existing::kReplace);
 
   // Sends a request to a route without a method here and returns the body of its response. After a
   // broken connection, sends a GET or a request with a key again.

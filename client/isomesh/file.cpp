@@ -1,6 +1,7 @@
 #include "client/isomesh/file.h"
 
 #include <cerrno>
+#include <cstdio>
 #include <ctime>
 #include <mutex>
 #include <set>
@@ -25,8 +26,14 @@ namespace {
               path.string() + ": " + std::generic_category().message(reason));
 }
 
-std::filesystem::path resolve(const std::filesystem::path& target) {
+std::filesystem::path resolve(const std::filesystem::path& target, Existing existing) {
   std::error_code error;
+  if (existing == Existing::kRefuse) {
+    if (std::filesystem::exists(std::filesystem::symlink_status(target, error))) {
+      fail(target, EEXIST);
+    }
+    return target;
+  }
   const auto status = std::filesystem::status(target, error);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     throw Error(ErrorCode::kInvalidParameter, target.string() + ": is not a regular file");
@@ -93,7 +100,8 @@ int create_unnamed(const std::filesystem::path& target) {
 
 }  // namespace
 
-PartFile::PartFile(const std::filesystem::path& target, Until until) : target_(resolve(target)) {
+PartFile::PartFile(const std::filesystem::path& target, Until until, Existing existing)
+    : target_(resolve(target, existing)), existing_(existing) {
   remove_forsaken(folder_of(target_));
   if (until == Until::kUnnamed) file_ = Descriptor(create_unnamed(target_));
   if (file_.number() >= 0) return;
@@ -131,10 +139,19 @@ void PartFile::sync() {
   if (::fsync(file_.number()) != 0) fail(target_, errno);
 }
 
+// A link replaces nothing, and neither does this kind of rename, which some network drives lack.
+bool PartFile::rename_to_target() const {
+  if (existing_ == Existing::kReplace) return ::rename(part_.c_str(), target_.c_str()) == 0;
+  if (::link(part_.c_str(), target_.c_str()) == 0) return ::unlink(part_.c_str()) == 0;
+  return errno != EEXIST &&
+         ::renameat2(AT_FDCWD, part_.c_str(), AT_FDCWD, target_.c_str(), RENAME_NOREPLACE) == 0;
+}
+
 void PartFile::publish() {
   sync();
   if (part_.empty()) {
     if (link_to(target_)) return;
+    if (existing_ == Existing::kRefuse && errno == EEXIST) fail(target_, EEXIST);
     // Only a rename replaces a file.
     const std::filesystem::path part = part_beside(target_);
     part_ = part;
@@ -144,7 +161,7 @@ void PartFile::publish() {
       if (error) fail(target_, error.value());
     }
   }
-  if (::rename(part_.c_str(), target_.c_str()) != 0) fail(target_, errno);
+  if (!rename_to_target()) fail(target_, errno);
   part_.clear();
 }
 

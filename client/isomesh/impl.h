@@ -1,11 +1,9 @@
 // Sends a Client's requests. Private to this folder.
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <functional>
-#include <iterator>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -13,9 +11,9 @@
 
 #include "client/isomesh/busy.h"
 #include "client/isomesh/client.h"
+#include "client/isomesh/pages.h"
 #include "client/isomesh/transport.h"
 #include "client/isomesh/url.h"
-#include "proto/json.h"
 
 namespace isomesh {
 
@@ -50,20 +48,17 @@ class Client::Impl {
     return repeated(request, before).body;
   }
 
+  // The body of one page of a list: the first, or the one of `cursor`.
+  std::string page(const std::string& path, Query query, const std::string& cursor) const {
+    if (!cursor.empty()) query.emplace_back("cursor", cursor);
+    return repeat({.target = path + query_string(query)});
+  }
+
   // All items of a list that comes in pages. `parse` reads those of one page.
   template <class Parse>
   auto all_pages(const std::string& path, const Parse& parse, const Query& query = {}) const {
-    decltype(parse(path)) all;
-    std::string cursor;
-    do {
-      Query asked = query;
-      if (!cursor.empty()) asked.emplace_back("cursor", cursor);
-      const std::string body = repeat({.target = path + query_string(asked)});
-      auto page = parse(body);
-      cursor = page.empty() ? "" : next_from_json(body);
-      std::ranges::move(page, std::back_inserter(all));
-    } while (!cursor.empty());
-    return all;
+    const auto ask = [&](const std::string& cursor) { return page(path, query, cursor); };
+    return isomesh::all_pages(ask, parse);
   }
 
   // Sends a request with a source, and resumes it after a broken connection.

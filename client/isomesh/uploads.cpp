@@ -141,6 +141,16 @@ Progress progress_of(const HttpResponse& response, std::uint64_t bytes) {
   return {*offset, response.header("upload-complete") == "?1"};
 }
 
+// Each has a volume or a problem.
+std::vector<UploadedVolume> checked(std::vector<UploadedVolume> volumes) {
+  const auto is_one = [](const UploadedVolume& each) {
+    return each.volume.has_value() != each.problem.has_value();
+  };
+  if (volumes.empty() || !std::ranges::all_of(volumes, is_one)) throw other_api();
+  if (volumes.size() == 1 && volumes.front().problem) throw to_error(*volumes.front().problem);
+  return volumes;
+}
+
 }  // namespace
 
 Error several_volumes(const std::vector<UploadedVolume>& volumes) {
@@ -180,7 +190,7 @@ std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem
   constexpr int kMultiStatus = 207;
   const bool is_resumable = file.size() >= options.resumable_bytes;
   const HttpResponse response = is_resumable ? impl_->resumed(request) : impl_->exchange(request);
-  if (response.status == kMultiStatus) return uploaded_volumes_from_json(response.body);
+  if (response.status == kMultiStatus) return checked(uploaded_volumes_from_json(response.body));
   return {{.member = {}, .status = response.status, .volume = volume_from_json(response.body)}};
 }
 

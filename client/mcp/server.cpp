@@ -333,6 +333,15 @@ template <class Take, class Refuse, class Pause>
 void for_each_line(const Take& take, const Refuse& refuse, const Pause& pause) {
   std::string line;
   bool is_too_long = false;
+  const auto end_line = [&] {
+    if (is_too_long) {
+      refuse();
+    } else if (line.find_first_not_of(" \t\r") != std::string::npos) {
+      take(line);
+    }
+    line.clear();
+    is_too_long = false;
+  };
   std::array<char, 65536> piece;
   while (true) {
     pollfd input{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
@@ -344,21 +353,15 @@ void for_each_line(const Take& take, const Refuse& refuse, const Pause& pause) {
     if (count < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (count <= 0) break;
     for (const char letter : std::string_view(piece.data(), static_cast<std::size_t>(count))) {
-      if (letter != '\n') {
-        is_too_long = is_too_long || line.size() == kLongestLine;
-        if (!is_too_long) line += letter;
+      if (letter == '\n') {
+        end_line();
         continue;
       }
-      if (is_too_long) {
-        refuse();
-      } else if (line.find_first_not_of(" \t\r") != std::string::npos) {
-        take(line);
-      }
-      line.clear();
-      is_too_long = false;
+      is_too_long = is_too_long || line.size() == kLongestLine;
+      if (!is_too_long) line += letter;
     }
   }
-  if (!is_too_long && !line.empty()) take(line);
+  end_line();
 }
 
 }  // namespace

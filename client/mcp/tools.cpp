@@ -1,6 +1,7 @@
 #include "client/mcp/tools.h"
 
 #include <algorithm>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -52,9 +53,34 @@ std::string text_of(const McpJson& arguments, const char* name) {
   return argument<std::string>(arguments, name).value_or("");
 }
 
+// Throws Error kInvalidParameter if `name` is given beside one of `others`, which would be ignored.
+void check_alone(const McpJson& arguments, const char* name,
+                 const std::vector<std::string>& others) {
+  const auto is_given = [&](const std::string& which) {
+    const auto found = arguments.find(which);
+    return found != arguments.end() && *found != nullptr && *found != "" && *found != false &&
+           *found != McpJson::array();
+  };
+  if (!is_given(name)) return;
+  for (const std::string& other : others) {
+    if (is_given(other))
+      throw invalid_parameter(other, std::string("cannot be given with ") + name);
+  }
+}
+
+std::vector<std::string> names_in(const McpJson& object) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : object.items()) names.push_back(name);
+  return names;
+}
+
 // The path of a file below the folder, with its links resolved. Throws Error kInvalidParameter for
 // any other.
 fs::path in_folder(const std::string& path, const fs::path& folder) {
+  // The system reads a path up to there.
+  if (path.find('\0') != std::string::npos) {
+    throw Error(ErrorCode::kInvalidParameter, "a path must not have the character U+0000");
+  }
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(folder / path, error);
   const auto [end, unused] = std::ranges::mismatch(folder, whole);
@@ -70,7 +96,8 @@ struct OutputFile {
   MeshFormat format;
 };
 
-OutputFile output_of(const std::string& name, const fs::path& folder) {
+// No file that it brings with it may exist either.
+OutputFile output_of(const std::string& name, const fs::path& folder, bool is_by_labels) {
   const fs::path path = in_folder(name, folder);
   const std::string suffix = lower(path.extension().string());
   const auto format = from_string<MeshFormat>(suffix.empty() ? suffix : suffix.substr(1));
@@ -79,17 +106,28 @@ OutputFile output_of(const std::string& name, const fs::path& folder) {
                 name + ": must end in the name of a format: " + names_of<MeshFormat>());
   }
   std::error_code error;
-  if (fs::exists(fs::symlink_status(path, error))) {
-    throw Error(ErrorCode::kInvalidParameter, name + ": exists already; choose another name");
+  for (const fs::path& file : files_of_mesh(path, *format, is_by_labels)) {
+    if (!fs::exists(fs::symlink_status(file, error))) continue;
+    const std::string what =
+        file == path ? name : name + ": its materials " + file.filename().string();
+    throw Error(ErrorCode::kInvalidParameter, what + ": exists already; choose another name");
   }
   return {path, *format};
 }
 
-std::vector<OutputFile> outputs_of(const McpJson& arguments, const fs::path& folder) {
+std::vector<OutputFile> outputs_of(const McpJson& arguments, const fs::path& folder,
+                                   bool is_by_labels) {
   std::vector<OutputFile> outputs;
+  std::set<fs::path> written;
   for (const std::string& name : argument<std::vector<std::string>>(arguments, "output")
                                      .value_or(std::vector<std::string>())) {
-    outputs.push_back(output_of(name, folder));
+    outputs.push_back(output_of(name, folder, is_by_labels));
+    const OutputFile& output = outputs.back();
+    for (const fs::path& file : files_of_mesh(output.path, output.format, is_by_labels)) {
+      if (written.insert(file).second) continue;
+      throw Error(ErrorCode::kInvalidParameter,
+                  name + ": another output writes " + file.filename().string());
+    }
   }
   return outputs;
 }
@@ -140,7 +178,9 @@ McpJson asked(const ToolCall& call, std::vector<std::string> path,
   std::erase_if(query, [](const auto& pair) { return pair.second.empty(); });
   const std::string body =
       call.client.ask({.method = method, .path = std::move(path), .query = std::move(query)});
-  return body.empty() ? McpJson::object() : parse_json<McpJson>(body);
+  McpJson response = parse_json<McpJson>(body, nullptr, false);
+  if (response.is_object()) return response;
+  throw Error(ErrorCode::kInternal, "the server's response does not match the API");
 }
 
 McpJson volumes(const McpJson& arguments, const ToolCall& call) {
@@ -162,6 +202,7 @@ McpJson labels(const McpJson& arguments, const ToolCall& call) {
 }
 
 McpJson jobs(const McpJson& arguments, const ToolCall& call) {
+  check_alone(arguments, "job", {"state", "volume", "cursor"});
   const std::string job = text_of(arguments, "job");
   if (!job.empty()) return asked(call, {"/v1/jobs", job});
   return asked(call, {"/v1/jobs"},
@@ -189,9 +230,7 @@ Job made(const JobParameters& parameters, const ToolCall& call) {
     throw Error(ErrorCode::kUnusableVolume, "the job " + id + " was cancelled");
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kCancelled) {
-      Options quick = call.options;
-      quick.retry_seconds = 2;
-      Client parting = client_of(quick, {});
+      Client parting = parting_client(call.options);
       parting.cancel(parting.submit(parameters, key).id);
     }
     throw;
@@ -201,16 +240,21 @@ Job made(const JobParameters& parameters, const ToolCall& call) {
 void write(const std::string& job, const std::vector<OutputFile>& outputs,
            std::optional<std::int64_t> label, const ToolCall& call) {
   for (const OutputFile& output : outputs) {
-    call.client.fetch(job, output.format, output.path, {}, label);
+    call.client.fetch(job, output.format, output.path, {}, label, Existing::kRefuse);
   }
 }
 
 McpJson mesh(const McpJson& arguments, const ToolCall& call) {
-  const std::vector<OutputFile> outputs = outputs_of(arguments, call.folder);
+  check_alone(arguments, "volume", names_in(upload_properties()));
   McpJson body = argument<McpJson>(arguments, "parameters").value_or(McpJson::object());
   if (!body.is_object()) throw invalid_parameter("parameters", "must be an object");
+  for (const char* const own : {"volume", "formats", "callback"}) {
+    if (body.contains(own)) throw invalid_parameter(own, "is not one of `parameters` here");
+  }
   const bool are_masks = argument<bool>(arguments, "masks").value_or(false);
   if (are_masks && !body.contains("iso") && !body.contains("labels")) body["labels"] = "all";
+  const std::vector<OutputFile> outputs =
+      outputs_of(arguments, call.folder, body.contains("labels"));
   std::vector<std::string> formats;
   for (const OutputFile& output : outputs) {
     const std::string name(to_string(output.format));
@@ -231,9 +275,12 @@ McpJson mesh(const McpJson& arguments, const ToolCall& call) {
 }
 
 McpJson fetch(const McpJson& arguments, const ToolCall& call) {
-  const std::vector<OutputFile> outputs = outputs_of(arguments, call.folder);
+  const auto label = argument<std::int64_t>(arguments, "label");
+  const std::string job = text_of(arguments, "job");
+  const bool is_by_labels = !label && call.client.job(job).parameters.labels;
+  const std::vector<OutputFile> outputs = outputs_of(arguments, call.folder, is_by_labels);
   if (outputs.empty()) throw invalid_parameter("output", "must name a file");
-  write(text_of(arguments, "job"), outputs, argument<std::int64_t>(arguments, "label"), call);
+  write(job, outputs, label, call);
   McpJson files = McpJson::array();
   for (const OutputFile& output : outputs) {
     files.push_back({{"file", output.path.lexically_relative(call.folder).string()},

@@ -10,6 +10,7 @@
 #include "base/command_line/manual.h"
 #include "base/error.h"
 #include "base/files.h"
+#include "base/text.h"
 #include "client/verify/verify.h"
 
 namespace {
@@ -95,7 +96,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kBadInput;
   } catch (const std::exception& error) {
-    std::cerr << "isomesh-verify: " << error.what() << '\n';
+    // It may repeat what a file says.
+    std::cerr << "isomesh-verify: " << printable_lines(error.what()) << '\n';
     return kBadInput;
   }
 }

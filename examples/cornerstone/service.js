@@ -12,7 +12,7 @@ const samplesOf = {
 };
 const slicesAtOnce = 8;
 
-const { Client, choicesOf } = await import(/* @vite-ignore */ `${server}/client.js`);
+const { ApiError, Client, choicesOf } = await import(/* @vite-ignore */ `${server}/client.js`);
 const client = new Client({ server });
 
 export async function upload(file) {
@@ -21,7 +21,7 @@ export async function upload(file) {
     if (volumes[0].problem) throw new Error(volumes[0].problem.detail);
     return volumes[0].volume;
   } catch (error) {
-    const choices = choicesOf(error);
+    const choices = error instanceof ApiError ? choicesOf(error) : new Map();
     if (choices.size > 0) error.message += ` This page cannot ask for ${[...choices.keys()].join(' and ')}.`;
     throw error;
   }

@@ -15,11 +15,13 @@ iso="$2"
 output="$3"
 server="${ISOMESH_SERVER:-http://127.0.0.1:8080}"
 
+# The token and the volume are for the daemon only, so a proxy of the environment gets neither: --noproxy.
+
 # ask ARGUMENT..: prints the body of the response. An error ends the script with the server's reason.
 ask() {
   local token=() answer status
   [[ -z "${ISOMESH_TOKEN:-}" ]] || token=(--header "Authorization: Bearer $ISOMESH_TOKEN")
-  answer="$(curl --silent --show-error --write-out '\n%{http_code}' "${token[@]}" "$@")"
+  answer="$(curl --silent --show-error --noproxy '*' --write-out '\n%{http_code}' "${token[@]}" "$@")"
   status="${answer##*$'\n'}"
   answer="${answer%$'\n'*}"
   if [[ "$status" != 2* ]]; then
@@ -29,9 +31,10 @@ ask() {
   printf '%s' "$answer"
 }
 
-# member NAME JSON: prints the first text with that name. jq does this better, if it is installed.
+# member NAME JSON: prints the first text with that name, without characters that control a terminal.
+# jq does this better, if it is installed.
 member() {
-  sed -n "s/.*\"$1\":\"\([^\"]*\)\".*/\1/p" <<<"${2//,\"/$'\n'\"}" | head -n 1
+  sed -n "s/.*\"$1\":\"\([^\"]*\)\".*/\1/p" <<<"${2//,\"/$'\n'\"}" | head -n 1 | tr -d '\000-\037\177'
 }
 
 answer="$(ask --request POST --upload-file "$file" "$server/v1/volumes")"
@@ -49,6 +52,14 @@ if [[ "$state" != succeeded ]]; then
   echo "mesh.sh: job $job: $state: $(member detail "$answer")" >&2
   exit 1
 fi
-curl --silent --show-error --fail ${ISOMESH_TOKEN:+--header "Authorization: Bearer $ISOMESH_TOKEN"} \
-  --output "$output" "$server/v1/jobs/$job/mesh.stl"
+# An earlier mesh stays until the new one is here as a whole.
+part="$output.part"
+trap 'rm -f -- "$part"' EXIT
+status="$(curl --silent --show-error --noproxy '*' ${ISOMESH_TOKEN:+--header "Authorization: Bearer $ISOMESH_TOKEN"} \
+  --write-out '%{http_code}' --output "$part" "$server/v1/jobs/$job/mesh.stl")"
+if [[ "$status" != 200 ]]; then
+  echo "mesh.sh: the mesh of job $job cannot be fetched: status $status: $(member detail "$(cat -- "$part")")" >&2
+  exit 1
+fi
+mv -- "$part" "$output"
 echo "$output"

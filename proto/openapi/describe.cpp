@@ -156,9 +156,8 @@ void write_jobs(Yaml& yaml, const Parameter& parameter) {
   }
 }
 
-std::string value_list(const Parameter& parameter) {
-  return "{ type: array, minItems: 1, items: { type: integer, minimum: " +
-         number_text(*parameter.minimum) + ", maximum: " + number_text(*parameter.maximum) + " } }";
+std::string label_list() {
+  return "{ type: array, minItems: 1, items: { " + reference("schemas", "Label") + " } }";
 }
 
 constexpr const char* kPlace = "{ type: array, minItems: 3, maxItems: 3, items: { type: number } }";
@@ -173,7 +172,7 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
   } else if constexpr (std::is_same_v<T, std::optional<LabelChoice>>) {
     yaml.under("oneOf", [&] {
       yaml.line("- const: all");
-      yaml.line("- { type: array, minItems: 1, items: { " + reference("schemas", "Label") + " } }");
+      yaml.line("- " + label_list());
     });
   } else if constexpr (std::is_same_v<T, std::vector<double>>) {
     yaml.line("type: array");
@@ -199,7 +198,7 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
     const std::string text = is_color ? "{ type: string, pattern: '^#[0-9a-fA-F]{6}$' }"
                                       : "{ type: string, minLength: 1, maxLength: " +
                                             std::to_string(LabelEntry::kMostNameBytes) + " }";
-    yaml.line("additionalProperties: " + (is_list ? value_list(parameter) : text));
+    yaml.line("additionalProperties: " + (is_list ? label_list() : text));
     yaml.line("default: {}");
   } else if (parameter.when_empty != nullptr) {
     yaml.under("oneOf", [&] {

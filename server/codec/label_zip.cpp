@@ -1,17 +1,15 @@
 #include "server/codec/label_zip.h"
 
 #include <algorithm>
-#include <set>
 #include <string>
 #include <utility>
 
 #include "base/hex.h"
 #include "base/sha256.h"
-#include "base/text.h"
 #include "proto/error.h"
 #include "server/codec/draco/grid.h"
+#include "server/codec/file_names.h"
 #include "server/codec/formats.h"
-#include "server/codec/label_titles.h"
 #include "server/codec/levels.h"
 #include "server/codec/zip_writer.h"
 #include "server/mesh/labels/label_surface.h"
@@ -23,49 +21,6 @@ namespace {
 // Labels are encoded in parallel, in batches of about this many triangles.
 constexpr std::size_t kTrianglesAtOnce = 1'000'000;
 constexpr std::size_t kLabelsAtOnce = 256;
-
-// Names for files: without a path, valid on all systems, unique regardless of case.
-class FileNames {
- public:
-  std::string of(const LabelSummary& label) {
-    std::string name;
-    for (const char c : title_of(label)) {
-      const bool is_plain = static_cast<unsigned char>(c) >= ' ' &&
-                            std::string_view("/\\:*?\"<>|").find(c) == std::string_view::npos;
-      name += is_plain ? c : '_';
-    }
-    name.resize(beginning(name, kMostBytes).size());
-    while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
-    if (name.starts_with('.') || name.empty() || is_device(name)) name.insert(name.begin(), '_');
-    const std::string title = name;
-    for (int more = 0; !taken_.insert(lowered(name)).second; ++more) {
-      name =
-          title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
-    }
-    return name;
-  }
-
- private:
-  // Leaves room for the suffix and a distinguishing number.
-  static constexpr std::size_t kMostBytes = 200;
-
-  // True for names that are devices on Windows, with or without a suffix.
-  static bool is_device(const std::string& name) {
-    const std::string stem = lowered(name.substr(0, name.find('.')));
-    const bool is_numbered = (stem.starts_with("com") || stem.starts_with("lpt")) &&
-                             stem.size() == 4 && stem[3] >= '1' && stem[3] <= '9';
-    return is_numbered || stem == "con" || stem == "prn" || stem == "aux" || stem == "nul";
-  }
-
-  static std::string lowered(std::string name) {
-    for (char& c : name) {
-      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    }
-    return name;
-  }
-
-  std::set<std::string> taken_;
-};
 
 struct Encoded {
   std::vector<std::byte> bytes;

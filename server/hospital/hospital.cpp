@@ -120,6 +120,7 @@ class OpenHospital {
   }
 
   orders::Orders& orders() { return orders_; }
+  const std::vector<orders::Rule>& rules() const { return settings_.rules; }
   // Null if it is not configured.
   const OwnWorklist* worklist() const { return worklist_ ? &*worklist_ : nullptr; }
 
@@ -176,9 +177,18 @@ class OpenHospital {
   std::unique_ptr<c_store::DimseListener> listener_;  // null if no series are received
 };
 
-http::MeasuredFamily orders_of(const store::OrderCounts& counts) {
+// Begins with 0 for every state and rule, and for orders without a rule: a change needs a first
+// sample.
+http::MeasuredFamily orders_of(const store::OrderCounts& counts,
+                               const std::vector<orders::Rule>& rules) {
+  auto by_state_and_rule = counts.by_state_and_rule;
+  for (int each = 0; each <= static_cast<int>(OrderState::kCancelled); ++each) {
+    const auto state = static_cast<OrderState>(each);
+    by_state_and_rule.try_emplace({state, ""}, 0);
+    for (const orders::Rule& rule : rules) by_state_and_rule.try_emplace({state, rule.name}, 0);
+  }
   http::MeasuredFamily family{.name = "isomesh_orders", .help = "Orders by state and rule"};
-  for (const auto& [what, count] : counts.by_state_and_rule) {
+  for (const auto& [what, count] : by_state_and_rule) {
     family.values.push_back({{{"state", std::string(to_string(what.first))}, {"rule", what.second}},
                              static_cast<double>(count)});
   }
@@ -246,8 +256,8 @@ class HospitalWing final : public http::Wing {
   std::vector<http::MeasuredFamily> measure() const override {
     if (!hospital_) return {};
     const store::OrderCounts counts = hospital_->orders().counts();
-    return {orders_of(counts), failures_of(hospital_->orders().attempts()), oldest_of(counts),
-            paused(hospital_->orders().is_paused())};
+    return {orders_of(counts, hospital_->rules()), failures_of(hospital_->orders().attempts()),
+            oldest_of(counts), paused(hospital_->orders().is_paused())};
   }
 
   void begin_drain() override {

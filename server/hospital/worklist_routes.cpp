@@ -10,6 +10,7 @@
 #include "proto/dicom_uid.h"
 #include "server/hospital/worklist/query.h"
 #include "server/hospital/worklist/workitem.h"
+#include "server/http/requests/upload.h"
 #include "server/http/routes/routes.h"
 
 namespace isomesh::hospital {
@@ -83,6 +84,7 @@ std::string uid_in_query(const Request& request) {
 }
 
 worklist::DataSet data_set_of(App& app, const Request& request) {
+  check_has_length(request);
   if (request.header("Content-Type").empty()) {
     throw Error(ErrorCode::kUnsupportedMedia,
                 std::string("the body needs the Content-Type ") + kDicomJson);
@@ -140,8 +142,9 @@ void retrieve(const OwnWorklist* worklist, const Request& request, Response& res
     response.told.reset();
     throw unknown_workitem();
   }
-  tell_patient(response, worklist::data_of(*record));
-  answer_dicom_json(response, '[' + record->data + ']');
+  const worklist::DataSet data = worklist::data_of(*record);
+  tell_patient(response, data);
+  answer_dicom_json(response, '[' + data.dump() + ']');
 }
 
 void search(const OwnWorklist* worklist, const Request& request, Response& response) {
@@ -160,10 +163,11 @@ void search(const OwnWorklist* worklist, const Request& request, Response& respo
       ++skipped;
       return true;
     }
-    const bool fits = count == 0 || found.size() + record.data.size() < kMostResponseBytes;
+    const std::string told = data->dump();  // a record may have more than the data set
+    const bool fits = count == 0 || found.size() + told.size() < kMostResponseBytes;
     has_more = count >= query.limit || !fits;
     if (has_more) return false;
-    found += (count == 0 ? "" : ",") + record.data;
+    found += (count == 0 ? "" : ",") + told;
     ++count;
     return true;
   });
@@ -225,7 +229,7 @@ void request_cancellation(App& app, const OwnWorklist* worklist, const Request& 
   const OwnWorklist& list = configured(worklist);
   check_requester(list, request);
   const worklist::DataSet reason =
-      request.content_length == 0 ? worklist::DataSet::object() : data_set_of(app, request);
+      request.has_body() ? data_set_of(app, request) : worklist::DataSet::object();
   const auto known = list.workitems.find(request.path_parameter("uid"));
   if (known && known->state == store::WorkitemState::kInProgress &&
       list.cancel_performing(known->transaction)) {

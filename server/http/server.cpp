@@ -63,6 +63,13 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_page_routes(state_->app);
   add_service_routes(state_->app);
   if (services.wing != nullptr) services.wing->add_routes(state_->app);
+  services.metrics.expect("", kNoRoute);
+  for (const Route& route : state_->app.router.routes()) {
+    for (const auto& [method, handler] : route.handlers()) {
+      services.metrics.expect(method, route.pattern());
+      services.metrics.expect(method, kNoRoute);
+    }
+  }
 }
 
 Server::~Server() {
@@ -76,7 +83,7 @@ std::string Server::bind(const net::Address& address) {
   const bool is_local = address.is_loopback() && !address.is_unix();
   rules.check_host = !state_->app.logins.are_required() && (is_local || !rules.hosts.empty());
   rules.hosts.push_back(address.host);
-  for (std::string& host : rules.hosts) host = host_of(host);
+  for (std::string& host : rules.hosts) host = host_named(host);
   const std::string authority = state_->listener.emplace(address).authority();
   if (address.is_unix()) return authority;
   return (state_->app.options.tls == nullptr ? "http://" : "https://") + authority;

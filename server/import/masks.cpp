@@ -21,7 +21,6 @@
 #include "server/import/source/scratch_folder.h"
 #include "server/volume/canonical.h"
 #include "server/volume/geometry.h"
-#include "server/volume/labels.h"
 
 namespace isomesh::import {
 namespace {
@@ -92,26 +91,40 @@ void check_grid(const Volume& mask, const std::string& first_file, const Volume&
                  " mm from those of " + name_in_quotes(first_file) + '.' + kOneGrid);
 }
 
-// Throws Error kUnusableVolume unless the samples are 0 and one other value, or all equal.
-void check_values(std::span<const std::byte> samples, const Volume& mask) {
+// The value inside of a mask; 0 if it is empty. Throws Error kUnusableVolume unless all samples are
+// this value or 0. Floats may be a little off, as after resampling.
+double value_inside(std::span<const std::byte> samples, const Volume& mask) {
   const auto [low, high] = mask.range;
-  if (low == high && low >= 0) return;
-  if (volume::mask_value(samples, mask.type, mask.range)) return;
+  // The farthest sample may be off in one direction, and the nearest in the other.
+  const double inside = std::abs(low) > std::abs(high) ? low : high;
+  constexpr double kNearly = 1e-3;
+  const double tolerance = is_integer(mask.type) ? 0 : kNearly * std::min(1.0, std::abs(inside));
+  const bool is_mask = with_sample(mask.type, [&](auto sample) {
+    using Sample = decltype(sample);
+    const std::span typed(reinterpret_cast<const Sample*>(samples.data()),
+                          samples.size() / sizeof(Sample));
+    return std::ranges::all_of(typed, [&](Sample value) {
+      const auto number = static_cast<double>(value);
+      return std::abs(number) <= tolerance || std::abs(number - inside) <= 2 * tolerance;
+    });
+  });
+  if (is_mask) return inside;
   throw_unusable(
       "It is not a mask: its samples are not 0 outside of a structure and one other "
       "value inside, but have several values from " +
       to_text(low) + " to " + to_text(high) + ". Leave this file out.");
 }
 
-// Adds `label` to the samples of a mask that are not 0. Returns false if there is none.
-bool add(std::span<const std::byte> samples, SampleType type, std::uint32_t label,
+// Adds `label` to the samples of a mask that are nearer to the value inside than to 0. Returns
+// false if there is none.
+bool add(std::span<const std::byte> samples, SampleType type, double inside, std::uint32_t label,
          std::span<Combinations::State> states, Combinations& combinations) {
   bool is_any = false;
   with_sample(type, [&](auto sample) {
     using Sample = decltype(sample);
     const std::span typed(reinterpret_cast<const Sample*>(samples.data()), states.size());
     for (std::size_t at = 0; at < states.size(); ++at) {
-      if (typed[at] == Sample{0}) continue;
+      if (std::abs(static_cast<double>(typed[at])) <= std::abs(inside) / 2) continue;
       states[at] = combinations.with(states[at], label);
       is_any = true;
     }
@@ -178,9 +191,9 @@ class Union {
     } else {
       check_grid(mask, masks_[0].file, volume_);
     }
-    check_values(samples.samples(), mask);
+    const double inside = value_inside(samples.samples(), mask);
     const auto label = static_cast<std::uint32_t>(at + 1);
-    if (add(samples.samples(), mask.type, label, states(), combinations_)) {
+    if (add(samples.samples(), mask.type, inside, label, states(), combinations_)) {
       entries_.push_back({.label = label});
     } else if (volume_.ignored.size() < kMostIgnored) {
       volume_.ignored.push_back(

@@ -12,6 +12,9 @@ namespace isomesh::store {
 
 namespace {
 
+constexpr const char* kDamagedVolume =
+    "the record of this volume is damaged: restore it from a backup, or delete the volume";
+
 // True for the first time that it is called with that text.
 bool is_new(const std::string& text) {
   // Beyond this number some are logged again.
@@ -52,9 +55,12 @@ std::optional<Volume> readable_volume(const std::string& record, const std::stri
 }
 
 void throw_damaged_volume(const std::string& field) {
-  constexpr const char* kReason =
-      "the record of this volume is damaged: restore it from a backup, or delete the volume";
-  throw Error(ErrorCode::kInternal, kReason, {{field, kReason}});
+  throw Error(ErrorCode::kInternal, kDamagedVolume, {{field, kDamagedVolume}});
+}
+
+bool is_of_damaged_volume(const Error& error) {
+  return error.code() == ErrorCode::kInternal && !error.fields().empty() &&
+         error.fields().front().message == kDamagedVolume;
 }
 
 }  // namespace isomesh::store

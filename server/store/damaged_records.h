@@ -29,4 +29,7 @@ std::optional<Volume> readable_volume(const std::string& record, const std::stri
 // Throws Error kInternal, whose `field` tells a client what is damaged.
 [[noreturn]] void throw_damaged_volume(const std::string& field);
 
+// True for that error.
+bool is_of_damaged_volume(const Error& error);
+
 }  // namespace isomesh::store

@@ -37,6 +37,11 @@ std::string result_key(const Volume& volume, const JobParameters& parameters,
   std::string text = mesher_version + '\n' + volume.samples + '\n' +
                      to_json(static_cast<const MeshParameters&>(parameters));
   if (!parameters.iso && !parameters.labels) text += "\niso " + to_text(volume.suggested_iso);
+  for (const LabelEntry& entry : volume.labels) {
+    if (!parameters.labels || entry.values.empty()) continue;
+    text += "\nlabel " + std::to_string(entry.label) + " is";
+    for (const std::int64_t value : entry.values) text += ' ' + std::to_string(value);
+  }
   if (parameters.certify) text += "\ncertified";
   if (parameters.min_thickness_mm) text += "\nthickness " + to_text(*parameters.min_thickness_mm);
   for (const Note& note : notes_in_mesh(volume.notes))
@@ -57,10 +62,14 @@ std::optional<Job> readable_job(const std::string& record, const std::string& id
 }
 
 std::string with_end_of(const Job& job, const std::string& record) {
-  JsonTree tree(record);
-  json_values::write_field(tree.root(), "state", job.state);
-  json_values::write_field(tree.root(), "finished", job.finished);
-  return dump(tree.root());
+  try {
+    JsonTree tree(without_digest(record));
+    json_values::write_field(tree.root(), "state", job.state);
+    json_values::write_field(tree.root(), "finished", job.finished);
+    return with_digest(dump(tree.root()));
+  } catch (const Error&) {
+    return to_record(job);  // that version could not read it either
+  }
 }
 
 Job damaged_job(const JobColumns& columns) {

@@ -34,7 +34,7 @@ std::optional<Job> readable_job(const std::string& record, const std::string& id
                                 const std::string& volume = {}, bool is_newer = false);
 
 // The record of a newer version with the end of the job, without losing what only that version
-// knows.
+// knows. That of `job` alone if the record is damaged.
 std::string with_end_of(const Job& job, const std::string& record);
 
 // Stands for a job with a damaged record. Its parameters are lost, so it can only fail, with the

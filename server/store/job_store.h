@@ -37,7 +37,7 @@ struct Submission {
     kNew,
     kExisting,     // the job submitted before with the same key and request
     kConflict,     // the key was used for another request
-    kBusy,         // nothing was stored: the queue is full or closed
+    kBusy,         // nothing was stored: the queue or its urgent part is full, or it is closed
     kOwnersShare,  // nothing was stored: the owner's share of the queue is full
   };
 
@@ -80,7 +80,7 @@ struct Outcome {
   Timing timing;  // with a mesh; otherwise the job keeps the progress of its last renewal
 };
 
-// The jobs that a list has; all if it is empty.
+// The jobs that a list has; all if it is empty. Times are those that jobs tell (Job::created).
 struct JobFilter {
   std::optional<JobState> state = {};
   std::optional<std::string> volume = {};
@@ -167,7 +167,8 @@ class JobStore {
   virtual ~JobStore() = default;
 
   // Stores a job. If the owner has an intact mesh of an equal job, the job is finished at once,
-  // with `reused` set. Throws Error kNotFound or kGone if the owner has no such volume.
+  // with `reused` set, unless equal jobs come and go all the time. Throws Error kNotFound or kGone
+  // if the owner has no such volume.
   virtual Submission submit(const JobSpec& spec) = 0;
 
   // Replaces a succeeded job's damaged mesh by submitting an equal job, which makes the same bytes.
@@ -211,8 +212,9 @@ class JobStore {
   // it is. Throws Error kNotFound or kGone.
   virtual Job cancel(const Viewer& viewer, const std::string& id) = 0;
 
-  // Erases an ended job, its events and its undelivered callback. Its id is then kNotFound. Returns
-  // false, and changes nothing, if the job is queued or running. Throws Error kNotFound or kGone.
+  // Erases an ended job, its undelivered callback, and its events but the end, which readers may
+  // still wait for. Its id is then kNotFound. Returns false, and changes nothing, if the job is
+  // queued or running. Throws Error kNotFound or kGone.
   virtual bool erase(const Viewer& viewer, const std::string& id, const BlobsGoing& going = {}) = 0;
 
   // Throws Error kNotFound or kGone.
@@ -254,9 +256,9 @@ class JobStore {
   virtual std::vector<Expirable> ended(const ExpiryFilter& filter, Ended which,
                                        std::size_t limit) const = 0;
 
-  // Removes ended jobs with their events, in the given order, until that frees `enough` bytes, that
-  // is, until no record names blobs of that total size. Skips jobs that are already gone.
-  // BlobStore::sweep removes the blobs themselves.
+  // Removes ended jobs, with their events but the end, in the given order, until that frees
+  // `enough` bytes, that is, until no record names blobs of that total size. Skips jobs that are
+  // already gone. BlobStore::sweep removes the blobs themselves.
   virtual Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) = 0;
 
   // The lease for retention: of the processes that share the records, one has it at a time, until

@@ -1,6 +1,7 @@
 // Interface of the store of undelivered callbacks.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -21,13 +22,17 @@ struct Delivery {
   std::int64_t created_us = 0;  // by the clock of the records: a retried order ends again later
 };
 
+// The longest time for which a delivery may be postponed.
+inline constexpr std::chrono::hours kLongestPostponed{24};
+
 // Survives restarts. The job store adds a delivery in the transaction that ends the job, so that
 // both happen or neither does. Thread safe; all methods may throw Error kOutOfSpace or kInternal.
 class Outbox {
  public:
   virtual ~Outbox() = default;
 
-  // Deliveries due at `now`, oldest first, at most `per_receiver` for each scheme, host and port.
+  // Deliveries due at `now`, or later than any is postponed, which means that the clock was set
+  // back; oldest first, at most `per_receiver` for each scheme, host and port.
   // If several processes share the records, the limit holds across them, and each returned delivery
   // is reserved for this process for a minute.
   virtual std::vector<Delivery> due(Time now, std::size_t per_receiver) const = 0;

@@ -34,6 +34,10 @@ class VolumeStore {
   // Throws Error kNotFound, or kGone if the record has expired.
   virtual Volume get(const Viewer& viewer, const std::string& id) const = 0;
 
+  // The same for what does not depend on this one volume: empty if there is no such record, and if
+  // it is damaged.
+  std::optional<Volume> find(const Viewer& viewer, const std::string& id) const;
+
   // Sets or removes the name of the owner's record, and returns the record. Throws as get does.
   virtual Volume rename(const std::string& owner, const std::string& id,
                         const std::optional<std::string>& name) = 0;

@@ -160,9 +160,21 @@ TEST_F(CommandTest, NoMeshOfARunOverwritesAnother) {
   write_pair("s-x");
   const Finished twice = command("mesh @s @s-x.mhd --iso 100 -o @out/ --format obj");
   EXPECT_EQ(twice.status, 1);
-  EXPECT_THAT(twice.errors, HasSubstr("isomesh: s: x.mhd: two meshes would be called s-x"));
+  EXPECT_THAT(twice.errors, HasSubstr("isomesh: s: x.mhd: two meshes would be written to "));
   EXPECT_THAT(twice.errors, HasSubstr("--member x.mhd"));
   EXPECT_THAT(outputs(), ElementsAre("s-x.obj", "s-y.obj", "study-a_ct.stl", "study-b_ct.stl"));
+}
+
+// Its names are known after the upload, while other inputs may still wait for theirs.
+TEST_F(CommandTest, NoMeshOfAnArchivesVolumeReplacesAnInput) {
+  write_pair("s/x");
+  write_pair("s/y");
+  write_file(folder_ / "s-x-b.vtk", "a volume");
+  const Finished result = command("mesh @s @s-x-b.vtk --iso 100 -o @{name}-b.vtk");
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("isomesh: s: x.mhd: the mesh would overwrite the volume "));
+  EXPECT_EQ(read_file(folder_ / "s-x-b.vtk"), "a volume");
+  EXPECT_TRUE(fs::exists(folder_ / "s-y-b.vtk"));
 }
 
 TEST_F(CommandTest, AMemberThatCannotBeMeshedKeepsNoOtherFromIt) {
@@ -179,7 +191,7 @@ TEST_F(CommandTest, AMemberThatCannotBeMeshedKeepsNoOtherFromIt) {
   EXPECT_EQ(result.status, 1);
   EXPECT_THAT(result.errors, HasSubstr("isomesh: s: b/ct.mhd: "));
   EXPECT_THAT(result.errors, HasSubstr("isomesh: s: f.mhd: "));
-  EXPECT_THAT(result.errors, HasSubstr("isomesh: s: x.mhd: two meshes would be called s-x"));
+  EXPECT_THAT(result.errors, HasSubstr("isomesh: s: x.mhd: two meshes would be written to "));
   EXPECT_THAT(outputs(), ElementsAre("s-ct.glb", "s-x.glb"));
 }
 

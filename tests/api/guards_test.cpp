@@ -29,10 +29,24 @@ TEST_F(GuardsTest, ABodyWithoutALengthIsRefusedAtOnce) {
   connection.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n\r\n");
   // The connection stays open on this side: a server that waited for a body would not answer.
   EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kLengthRequired));
-  for (const std::string method : {"POST", "PUT", "PATCH"}) {
-    EXPECT_TRUE(is_problem(answer_to(method + " /v1/jobs HTTP/1.1\r\nHost: localhost\r\n\r\n"),
-                           ErrorCode::kLengthRequired));
+  for (const std::string path : {"POST /v1/jobs", "POST /v1/mesh?iso=1", "PATCH /v1/volumes/0"}) {
+    EXPECT_TRUE(is_problem(answer_to(path + " HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+                           ErrorCode::kLengthRequired))
+        << path;
   }
+}
+
+// As `curl -X POST` sends it (RFC 9112, 6.3).
+TEST_F(GuardsTest, ARequestThatTakesNoBodyNeedsNoLength) {
+  const std::string volume = "/v1/volumes/" + upload(daemon_, sphere_upload()).id;
+  const auto post = [&](const std::string& target) {
+    return answer_to("POST " + target + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  };
+  EXPECT_EQ(post(volume + "/reoriented?axes=-x,y,z").status, 201);
+  EXPECT_TRUE(is_problem(post("/v1/orders/0/retry"), ErrorCode::kNotFound));
+  EXPECT_TRUE(is_problem(post("/v1/volumes?upload=" + std::string(32, '0')), ErrorCode::kGone));
+  EXPECT_TRUE(is_problem(post("/v1/nothing"), ErrorCode::kNotFound));
+  EXPECT_TRUE(is_problem(post("/livez"), ErrorCode::kMethodNotAllowed));
 }
 
 TEST_F(GuardsTest, ADeleteNeedsNoBody) {

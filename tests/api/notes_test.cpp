@@ -9,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/isomesh/package.h"
 #include "proto/json.h"
 #include "server/import/dicom/elements/tags.h"
 #include "tests/api/daemon.h"
@@ -310,51 +309,6 @@ TEST_F(NotesTest, AStructureSetAloneNeedsASpacing) {
   const Answer labels = daemon_.send("GET", "/v1/volumes/" + volume.id + "/labels");
   EXPECT_THAT(labels.body, AllOf(HasSubstr("heart"), HasSubstr("#ff0000")));
   EXPECT_EQ(daemon_.send("POST", "/v1/volumes?spacing=0,1,1", structure_set()).status, 400);
-}
-
-TEST_F(NotesTest, ARefusedUploadIsKeptForWhoWantsToChoose) {
-  const std::string file = two_times();
-  EXPECT_EQ(daemon_.send("POST", "/v1/volumes", file).header("isomesh-upload"), "");
-  const Answer open = daemon_.send("POST", "/v1/volumes?keep=true", file,
-                                   {{"Content-Disposition", "attachment; filename=\"t.nii\""}});
-  EXPECT_EQ(open.status, 422);
-  const std::string kept = open.header("isomesh-upload");
-  ASSERT_EQ(kept.size(), 32U);
-  const std::string again = "/v1/volumes?keep=true&upload=" + kept;
-  EXPECT_EQ(daemon_.send("POST", again).header("isomesh-upload"), kept);
-  EXPECT_EQ(daemon_.send("POST", again + "&volume=1", "a body").status, 400);
-  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?keep=maybe", file).status, 400);
-  const Answer chosen = daemon_.send("POST", again + "&volume=1");
-  ASSERT_EQ(chosen.status, 201) << chosen.body;
-  const Volume volume = volume_from_json(chosen.body);
-  EXPECT_EQ(volume.name, "t.nii");
-  EXPECT_THAT(volume.notes, Contains(Field(&Note::code, "volume-chosen")));
-  EXPECT_EQ(daemon_.send("POST", again + "&volume=0").status, 410);
-
-  // An upload that no option can fix is not kept. Raw data is kept, because options can describe
-  // it.
-  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?keep=true", nrrd("", "few")).header("isomesh-upload"),
-            "");
-  const Answer raw = daemon_.send("POST", "/v1/volumes?keep=true", std::string(24, 'a'));
-  EXPECT_EQ(raw.status, 415);
-  const std::string described =
-      "/v1/volumes?dims=4,3,2&type=uint8&upload=" + raw.header("isomesh-upload");
-  EXPECT_EQ(daemon_.send("POST", described).status, 201);
-}
-
-TEST_F(NotesTest, AKeptFolderHasEachOfItsVolumesRead) {
-  const Shown several = {{{"a.nii", two_times()}, {"b.nrrd", nrrd("")}}};
-  const std::filesystem::path folder = folder_ / "kept";
-  std::filesystem::create_directory(folder);
-  for (const auto& [name, bytes] : several.files) write_file(folder / name, bytes);
-  const UploadBody body(folder);
-  std::string bytes(body.size(), '\0');
-  body.read(0, bytes);
-  const Answer first = daemon_.send("POST", "/v1/volumes?keep=true", bytes);
-  EXPECT_EQ(first.status, 207);
-  const std::string again = "/v1/volumes?member=a.nii&upload=" + first.header("isomesh-upload");
-  EXPECT_EQ(daemon_.send("POST", again + "&volume=0").status, 201);
-  EXPECT_EQ(daemon_.send("POST", again + "&volume=1").status, 201);
 }
 
 TEST_F(NotesTest, EveryVolumeOfAFolderIsAnsweredFor) {

@@ -226,7 +226,10 @@ TEST(Configuration, ValuesAreReadAsToml) {
       {R"(max-upload = "1KiB")", "max-upload = 1024"},
       {"keep-days = 2.50", "keep-days = 2.5"},
       {"open-network = true", "open-network = true"},
-      {R"(cors-origin = ["https://x", 'https://y'])", R"(cors-origin = "https://x,https://y")"},
+      {R"(cors-origin = ["https://x", 'https://y'])",
+       R"(cors-origin = ["https://x", "https://y"])"},
+      {R"(cors-origin = "https://x,https://y")", R"(cors-origin = ["https://x", "https://y"])"},
+      {R"(allow-host = "[2001:db8::1]")", R"(allow-host = "[2001:db8::1]")"},
       {"callback-allow = [\n  # none\n]", "# callback-allow = []"},
       {"tokens = \"\"", "# tokens = \"\""},
       {"disk-reserve = \"\"", "# disk-reserve = \"\""}};
@@ -234,6 +237,28 @@ TEST(Configuration, ValuesAreReadAsToml) {
     const Finished told = checked(folder, "# \xc2\xa7 1\r\n" + text + '\n');
     EXPECT_EQ(told.status, 0) << text << told.errors;
     EXPECT_THAT('\n' + told.output, HasSubstr('\n' + line + '\n')) << text;
+  }
+}
+
+// As distinguished names and URLs have them.
+TEST(Configuration, ValuesOfAnOptionThatMayBeRepeatedMayHaveCommas) {
+  const TemporaryFolder folder;
+  const std::string roles = R"(oidc-role = ["CN=ct,OU=clinic=user", "[it,all]=admin"])";
+  const std::string parameter = R"(oidc-parameter = "claims={\"a\":1,\"b\":2}")";
+  const std::string provider =
+      "oidc-issuer = \"https://login.example\"\noidc-audience = \"isomesh\"\n";
+  const std::vector<std::string> words = {ISOMESHD, "check", "--config", folder / "provider.toml"};
+  write_file(folder / "provider.toml", provider);
+  const std::string claims = R"(claims={"a":1,"b":2})";
+  for (const Finished& told :
+       {checked(folder, provider + roles + '\n' + parameter),
+        run(with(words, {"--oidc-role", "CN=ct,OU=clinic=user", "--oidc-role", "[it,all]=admin",
+                         "--oidc-parameter", claims})),
+        run(words, {"ISOMESH_OIDC_ROLE=CN=ct,OU=clinic=user\n[it,all]=admin",
+                    "ISOMESH_OIDC_PARAMETER=" + claims})}) {
+    EXPECT_EQ(told.status, 0) << told.errors;
+    EXPECT_THAT(told.output, HasSubstr('\n' + roles + '\n'));
+    EXPECT_THAT(told.output, HasSubstr('\n' + parameter + '\n'));
   }
 }
 

@@ -271,6 +271,16 @@ TEST_F(ResumeTest, OneThatIsGivenUpLeavesNothing) {
   EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
 }
 
+TEST_F(ResumeTest, ARequestThatIsTooLargeTakesNothingFromOthers) {
+  const std::string place = begun();
+  ASSERT_EQ(daemon_->send("PATCH", place, raw_.bytes.substr(0, 1000), part(0, false)).status, 204);
+  const Answer refused = answer_to(daemon_->url(),
+                                   "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n"
+                                   "Content-Length: 99999999999999\r\n\r\n");
+  EXPECT_TRUE(is_problem(refused, ErrorCode::kTooLarge));
+  EXPECT_EQ(offset_of(place), "1000");
+}
+
 // Somebody else with the same token cancels it.
 TEST_F(ResumeTest, AClientDoesNotSendAgainWhatWasCancelled) {
   raw_ = long_upload();

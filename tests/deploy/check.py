@@ -2,14 +2,16 @@
 """What has to be true of the files in docker/ by which several daemons are run.
 
   check.py compose FILE          of a compose file
+  check.py guide FILE            docs/cluster.md names the paths that one daemon has
   check.py chart < MANIFESTS     of a chart's manifests, as `helm template` renders them
-  check.py metrics FILE...       alert rules and dashboards name metrics and labels that the daemon has
+  check.py metrics FILE...       alert rules and dashboards name metrics that the daemon has
 """
 import json
 import os
 import re
 import sys
 
+import wing
 import yaml
 
 checks = 0
@@ -42,8 +44,10 @@ def check_nginx(folder, service):
                               re.MULTILINE | re.DOTALL))
     check(set(re.findall(r"proxy_pass http://(\w+)[;/]", main)) == set(servers),
           "nginx passes requests to other servers than there are")
-    check(re.search(r"location ~ \^/v1/\(orders\|pacs\)\(/\|\$\) \{\s*proxy_pass http://iso_orders;", main),
-          "nginx does not tell orders apart")
+    orders = re.search(r"location ~ (\S+) \{\s*proxy_pass http://iso_orders;", main)
+    check(orders, "nginx does not tell orders apart")
+    for path, is_wing in wing.paths().items():
+        check(bool(re.search(orders[1], path)) == is_wing, f"nginx passes {path} to the wrong daemons")
     check(len(re.findall(r"^\s*server ", servers["iso_orders"], re.MULTILINE)) == 1,
           "several daemons get orders")
 
@@ -63,6 +67,9 @@ def check_compose(file):
         asked = service["healthcheck"]["test"] if "healthcheck" in service else health_of_image(file)
         check("/readyz" in asked[-1], f"{name} is not asked whether it is ready")
         check(service["stop_grace_period"] == "45s", f"{name} is not given the time to drain")
+        # Otherwise nginx is the address of every client, in the audit trail and where addresses share places.
+        network = compose.get("networks", {}).get("default", {}).get("ipam", {}).get("config", [{}])[0].get("subnet")
+        check(service["environment"].get("ISOMESH_TRUSTED_PROXY") == (network or "unix"), f"{name} does not trust nginx")
     for name, service in services.items():
         for place in service.get("volumes", []):
             source = place.split(":")[0]
@@ -76,6 +83,14 @@ def check_compose(file):
           "the daemons have not the same stores")
     if len(daemons) > 1:
         check(all(len(store) == 2 for store in stores.values()), "daemons have stores of their own")
+
+
+def check_guide(file):
+    """docs/cluster.md names what a load balancer has to tell apart."""
+    with open(file, encoding="utf-8") as text:
+        sentence = re.search(r"Every daemon takes every request, except those to (.*?):", text.read(), re.DOTALL)
+    check(sentence and set(re.findall(r"`(.*?)`", sentence[1])) == set(wing.roots()),
+          f"{file} does not name the paths of orders: {wing.roots()}")
 
 
 def check_chart():
@@ -142,6 +157,8 @@ def check_metrics(files):
 
 if sys.argv[1] == "compose":
     check_compose(sys.argv[2])
+elif sys.argv[1] == "guide":
+    check_guide(sys.argv[2])
 elif sys.argv[1] == "metrics":
     check_metrics(sys.argv[2:])
 else:

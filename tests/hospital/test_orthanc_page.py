@@ -101,6 +101,8 @@ class Page(unittest.TestCase):
         for fault, status, detail in (
             (lambda *_: (lambda connection: False), 502, "isomesh gave no answer: Remote end closed connection without response"),
             (lambda *_: (504, {"Content-Type": "text/html"}, b"<html>"), 504, "isomesh answered with status 504"),
+            (lambda *_: (307, {"Location": "http://127.0.0.1:9/"}, b""), 502, "isomesh answered with status 307"),
+            (lambda *_: (lambda connection: connection.sendall(b"no HTTP\r\n\r\n")), 502, "isomesh gave no answer: no HTTP"),
             (lambda *_: (200, {"Content-Type": "text/html"}, b"<html>"), 502, "isomesh gave no answer: Expecting value"),
             (lambda *_: (401, {"Content-Type": "application/json"}, refused), 502, "The token is not known"),
         ):

@@ -3,6 +3,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import sqlite3
 import subprocess
 import time
@@ -53,8 +54,13 @@ class OwnWorklist(Loop):
     def item(self, daemon, uid):
         status, _, (item,) = self.ask(daemon, "GET", "/" + uid)
         self.assertEqual(status, 200)
-        self.assertNotIn(TRANSACTION, item)
+        self.assert_data_set(item)
         return item
+
+    def assert_data_set(self, item):
+        """It has attributes only, and not the secret one."""
+        self.assertEqual([tag for tag in item if not re.fullmatch("[0-9A-F]{8}", tag)], [])
+        self.assertNotIn(TRANSACTION, item)
 
     def reaches(self, daemon, uid, state):
         peers.until(lambda: value(self.item(daemon, uid), STATE) == state)
@@ -83,6 +89,7 @@ class OwnWorklist(Loop):
         self.assertEqual(self.ask(listing, "GET", "?ProcedureStepState=SCHEDULED")[0], 204)
         found = self.ask(listing, "GET", "?StudyInstanceUID=" + series.study)[2]
         self.assertEqual([value(each, "00080018") for each in found], [uid])
+        self.assert_data_set(found[0])
         read = [each for each in listing.audit() if each.get("what") == "workitem"]
         self.assertEqual({(each["event"], each["study"], each["patient_id"]) for each in read},
                          {("110112", series.study, "PAT-4711")})
@@ -105,6 +112,18 @@ class OwnWorklist(Loop):
         for uid, each in zip(uids, series):
             self.reaches(daemon, uid, "COMPLETED")
             self.assert_performed(daemon, daemon, uid, each)
+
+    def test_a_workitem_of_another_patient(self):
+        """Nothing is made of the images of one patient for a workitem of another one."""
+        series = self.series()
+        listing = self.daemon(rules="[worklist]")
+        uid = self.uid()
+        self.assertEqual(self.ask(listing, "POST", "?" + uid, workitem(series, "PAT-4712"))[0], 201)
+        performer = self.daemon(rules=RULE.format(port=listing.port, path=PATH))
+        self.reaches(listing, uid, "CANCELED")
+        order, = performer.call("GET", "/v1/orders")[2]["orders"]
+        self.assertIn("another Patient ID", performer.ended(order["id"])["error"]["detail"])
+        self.assertEqual(self.stored(series), [])
 
     def test_a_request_cancels_its_own(self):
         """A performer of the same daemon hears of a request; a second one changes nothing."""

@@ -138,6 +138,30 @@ class Segmentations(Loop):
                          segmentation["sop_instance_uid"])
         self.assertEqual(len(self.pacs.objects(series.study, "SEG")), 1)
 
+    def test_many_labels_with_names(self):
+        """The names and colours of 1500 labels are more than an attribute of short length holds."""
+        size, count = 24, 1500
+        series = self.series(size=size, slices=SLICES)
+        head = (f"NRRD0004\ntype: uint16\ndimension: 3\nsizes: {size} {size} {SLICES}\nspace: left-posterior-superior\n"
+                "encoding: raw\nendian: little\nspace directions: (2,0,0) (0,2,0) (0,0,2)\nspace origin: (-20,-30,0)\n")
+        for n in range(count):
+            head += (f"Segment{n}_ID:=s{n}\nSegment{n}_Name:=Structure with a rather long name {n}\n"
+                     f"Segment{n}_LabelValue:={n + 1}\nSegment{n}_Layer:=0\nSegment{n}_Color:=1 0 0\n")
+        inside = range(1, size - 1)
+        samples = b"".join(
+            struct.pack("<H", (x // 2 + 11 * (y // 2) + 121 * z) % count + 1 if x in inside and y in inside and 0 < z < SLICES - 1 else 0)
+            for z in range(SLICES) for y in range(size) for x in range(size))
+        daemon = self.daemon()
+        labels = self.upload(daemon, head.encode() + b"\n" + samples)
+        order = self.succeeded(daemon, self.order(daemon, series, label_volume=labels["id"], parameters={"labels": "all"},
+                                                  send=[{"pacs": "main", "format": "obj"}]), 120)
+        for result in order["results"]:
+            path = os.path.join(self.folder.name, result["sop_instance_uid"])
+            with open(path, "wb") as file:
+                file.write(self.pacs.file(result["sop_instance_uid"]))
+            parameters = self.value(path, "0066,0032")[0]
+            self.assertEqual(json.loads(parameters[1:-1])["labels"], "all")
+
     def test_labels_of_something_else(self):
         daemon = self.daemon()
         labels = self.upload(daemon, nifti(SIZE, SLICES, label_of))

@@ -18,23 +18,17 @@ class Chunks {
     helped_.store(false, std::memory_order_relaxed);
   }
 
-  // Publishes the items below `count`. Processes them unless a helper does.
-  template <class Work>
-  void bring(std::uint32_t count, Work work) {
-    there_.store(count, std::memory_order_release);
-    if (helped_.load(std::memory_order_relaxed)) {
-      there_.notify_one();
-    } else {
-      while (take(work)) {
-      }
+  // Calls produce(bring); bring(count) publishes the items below `count`, and processes them unless
+  // a helper does. No more items follow when `produce` ends or throws, so a helper ends, too.
+  template <class Work, class Produce>
+  void produce(Work work, Produce produce) {
+    {
+      const struct Close {
+        ~Close() { chunks.close(); }
+        Chunks& chunks;
+      } close{*this};
+      produce([&](std::uint32_t count) { bring(count, work); });
     }
-  }
-
-  // No more items follow. Processes the remaining ones.
-  template <class Work>
-  void end(Work work) {
-    there_.fetch_or(kAll, std::memory_order_release);
-    there_.notify_one();
     while (take(work)) {
     }
   }
@@ -54,6 +48,22 @@ class Chunks {
  private:
   static constexpr std::uint32_t kAll = 1U << 31;
   static constexpr std::uint32_t kMostAtOnce = 1024;
+
+  template <class Work>
+  void bring(std::uint32_t count, Work& work) {
+    there_.store(count, std::memory_order_release);
+    if (helped_.load(std::memory_order_relaxed)) {
+      there_.notify_one();
+    } else {
+      while (take(work)) {
+      }
+    }
+  }
+
+  void close() {
+    there_.fetch_or(kAll, std::memory_order_release);
+    there_.notify_one();
+  }
 
   // Calls work(begin, end) for the next items. Returns false if there are none.
   template <class Work>

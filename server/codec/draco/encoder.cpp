@@ -220,13 +220,13 @@ bool Encoder::Stages::traverse(const mesh::Context& context) {
 }
 
 void Encoder::Stages::put_in_order() {
-  const auto predict = predictor(0);
-  for (std::uint32_t i = 0;; ++i) {
-    const std::optional<Start> start = starts_.get(i);
-    if (!start) break;
-    order_.add(*start, [&](std::uint32_t count) { chunks_.bring(count, predict); });
-  }
-  chunks_.end(predict);
+  chunks_.produce(predictor(0), [&](const auto& bring) {
+    for (std::uint32_t i = 0;; ++i) {
+      const std::optional<Start> start = starts_.get(i);
+      if (!start) break;
+      order_.add(*start, bring);
+    }
+  });
 }
 
 std::vector<std::byte> Encoder::Stages::stream_of(const Grid& grid, bool has_normals) {

@@ -349,20 +349,29 @@ void DimseListener::note_fault(const std::string& party, net::TlsFault fault) {
 
 void DimseListener::note_rejection(std::string_view reason, const DimseEnded& ended,
                                    const std::string& party) {
-  const auto unlisted = rejections_.permit();
-  if (!unlisted) return;
+  rejections_.add({std::string(reason), party, ended.called, ended.calling});
+}
+
+bool DimseListener::tell(const Rejection& rejection, std::uint64_t unlisted) const {
+  try {
+    services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
+                         .success = false,
+                         .peer_name = "dimse",
+                         .direction = "in",
+                         .peer = rejection.peer,
+                         .called = rejection.called,
+                         .calling = rejection.calling,
+                         .unlisted = unlisted});
+  } catch (const std::exception& error) {
+    log_error("the audit trail cannot be written to: {}", error.what());
+    return false;
+  }
+  // Not before: while the trail cannot be written to, the same rejection is told again and again.
   LogLine("association", LogLevel::kWarn)
-      .add("rejected", reason)
-      .add("peer", party)
-      .add("unlisted", *unlisted);
-  services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
-                       .success = false,
-                       .peer_name = "dimse",
-                       .direction = "in",
-                       .peer = party,
-                       .called = ended.called,
-                       .calling = ended.calling,
-                       .unlisted = *unlisted});
+      .add("rejected", rejection.reason)
+      .add("peer", rejection.peer)
+      .add("unlisted", unlisted);
+  return true;
 }
 
 }  // namespace isomesh::c_store

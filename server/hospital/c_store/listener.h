@@ -80,6 +80,13 @@ class DimseListener {
     std::atomic<std::chrono::steady_clock::time_point> told = {};
   };
 
+  struct Rejection {
+    std::string reason;
+    std::string peer;
+    std::string called;
+    std::string calling;
+  };
+
   // The number of stored objects by called title, calling title and study.
   using Transfers = std::map<std::array<std::string, 3>, std::uint64_t>;
 
@@ -101,6 +108,8 @@ class DimseListener {
   // Adds a rejection, with its reason, to the log and the audit trail.
   void note_rejection(std::string_view reason, const dimse::DimseEnded& ended,
                       const std::string& party);
+  // Returns false if the trail cannot be written to.
+  bool tell(const Rejection& rejection, std::uint64_t unlisted) const;
   // Adds what an association has stored to the audit trail.
   void note_transfers(const Transfers& transfers, const std::string& party);
 
@@ -115,7 +124,10 @@ class DimseListener {
   std::vector<std::shared_ptr<Association>> open_ ISOMESH_GUARDED_BY(mutex_);
   std::deque<std::shared_ptr<Association>> ready_ ISOMESH_GUARDED_BY(mutex_);
   // Otherwise anybody who can connect could fill the trail, which cannot be emptied.
-  Throttle rejections_{std::chrono::seconds(1)};
+  Throttle<Rejection> rejections_{std::chrono::seconds(1),
+                                  [this](const Rejection& rejection, std::uint64_t unlisted) {
+                                    return tell(rejection, unlisted);
+                                  }};
   // Last: its thread and these use the other members.
   AssociationAcceptor acceptor_;
   std::vector<std::jthread> threads_;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/ids.h"
+#include "client/isomesh/pages.h"
 #include "proto/json.h"
 
 namespace isomesh {
@@ -61,6 +62,15 @@ OrderPage OrderClient::list(std::optional<OrderState> state, const std::string& 
   if (!cursor.empty()) request.query.emplace_back("cursor", cursor);
   const std::string body = client_.ask(request);
   return {.orders = orders_from_json(body), .next = next_from_json(body)};
+}
+
+std::vector<Order> OrderClient::all() {
+  const auto ask = [this](const std::string& cursor) {
+    RouteRequest request = {.path = {kOrders}};
+    if (!cursor.empty()) request.query.emplace_back("cursor", cursor);
+    return client_.ask(request);
+  };
+  return all_pages(ask, orders_from_json);
 }
 
 Order OrderClient::cancel(const std::string& id) {

@@ -36,6 +36,7 @@ class OrderClient {
   // One page of the orders, in that state and of that rule if given.
   OrderPage list(std::optional<OrderState> state = std::nullopt, const std::string& rule = {},
                  const std::string& cursor = {});
+  std::vector<Order> all();
   Order cancel(const std::string& id);
   // Restarts a failed order. Throws kNotReady for one that has not failed.
   Order retry(const std::string& id);

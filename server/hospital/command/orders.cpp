@@ -1,7 +1,6 @@
 #include "server/hospital/command/orders.h"
 
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -12,6 +11,7 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "client/cli/console.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/ids.h"
 #include "client/cli/option_values.h"
@@ -71,7 +71,7 @@ OrderRequest request_of(const OrderOptions& asked) {
 }
 
 std::string reason_of(const Order& order) {
-  return order.error ? ": " + printable_lines(order.error->detail) : std::string();
+  return order.error ? ": " + order.error->detail : std::string();
 }
 
 // Prints one line for each step when it ends.
@@ -80,13 +80,13 @@ class StepTimes {
   void see(const Order& order) {
     if (order.state != state_) {
       const auto now = std::chrono::steady_clock::now();
-      std::cerr << to_string(state_) << ' ' << in_seconds(now - began_) << '\n';
+      remark(std::string(to_string(state_)) + ' ' + in_seconds(now - began_));
       began_ = now;
       state_ = order.state;
     }
     if (order.attempts != attempts_ && order.error) {
       attempts_ = order.attempts;
-      std::cerr << "attempt " << attempts_ << " failed" << reason_of(order) << '\n';
+      remark("attempt " + std::to_string(attempts_) + " failed" + reason_of(order));
     }
   }
 
@@ -96,25 +96,21 @@ class StepTimes {
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
 
-void show(const Order& order) {
-  std::cout << order.id << ' ' << to_string(order.state) << reason_of(order) << '\n';
-  std::cout << "  ordered " << order.created << " from " << printable(order.source.pacs)
-            << ", study " << printable(order.source.study);
-  if (order.rule) std::cout << ", rule " << printable(*order.rule);
-  std::cout << '\n';
-  if (order.next_attempt) std::cout << "  next attempt " << *order.next_attempt << '\n';
+std::string report_of(const Order& order) {
+  std::string text = order.id + ' ' + std::string(to_string(order.state)) + reason_of(order) + '\n';
+  const auto add = [&text](const std::string& line) { text += "  " + printable(line) + '\n'; };
+  add("ordered " + order.created + " from " + order.source.pacs + ", study " + order.source.study +
+      (order.rule ? ", rule " + *order.rule : ""));
+  if (order.next_attempt) add("next attempt " + *order.next_attempt);
   for (const OrderResult& result : order.results) {
-    std::cout << "  " << result.pacs << ' ' << (result.stored ? "has" : "lacks") << ' '
-              << result.sop_instance_uid << " (" << result.bytes << " bytes)\n";
+    add(result.pacs + (result.stored ? " has " : " lacks ") + result.sop_instance_uid + " (" +
+        std::to_string(result.bytes) + " bytes)");
   }
+  return text;
 }
 
-void print(const Order& order, bool json) {
-  if (json) {
-    std::cout << to_json(order) << '\n';
-  } else {
-    show(order);
-  }
+void show(const Order& order, bool json) {
+  json ? print_json(to_json(order)) : print(report_of(order));
 }
 
 bool is_json_object(std::string_view text) {
@@ -178,26 +174,18 @@ int order(Client& server, const Options& options, const OrderOptions& asked) {
   OrderClient client(server);
   const Order accepted = client.submit(request_of(asked), options.key);
   if (asked.does_not_wait) {
-    std::cout << (options.json ? to_json(accepted) : accepted.id) << '\n';
+    options.json ? print_json(to_json(accepted)) : print(accepted.id + '\n');
     return kDone;
   }
   StepTimes times;
   const Order ended = client.wait_for(accepted.id, [&times](const Order& now) { times.see(now); });
-  print(ended, options.json);
+  show(ended, options.json);
   return ended.state == OrderState::kSucceeded ? kDone : kRefused;
 }
 
-// All pages, or the first one.
-std::vector<Candidate> candidates(OrderClient& client, bool is_first_page) {
+std::vector<Candidate> candidates_of(const std::vector<Order>& orders) {
   std::vector<Candidate> all;
-  std::string cursor;
-  do {
-    const OrderPage page = client.list(std::nullopt, {}, cursor);
-    for (const Order& order : page.orders) {
-      all.push_back({order.id, std::string(to_string(order.state))});
-    }
-    cursor = page.next;
-  } while (!is_first_page && !cursor.empty());
+  for (const Order& order : orders) all.push_back({order.id, std::string(to_string(order.state))});
   return all;
 }
 
@@ -205,20 +193,20 @@ int orders(Client& server, const Options& options, const ListOptions& asked) {
   OrderClient client(server);
   if (!options.id.empty()) {
     const std::string id =
-        timed_id(options.id, "order", [&client] { return candidates(client, false); });
-    print(asked.cancels   ? client.cancel(id)
-          : asked.retries ? client.retry(id)
-                          : client.get(id),
-          options.json);
+        timed_id(options.id, "order", [&client] { return candidates_of(client.all()); });
+    show(asked.cancels   ? client.cancel(id)
+         : asked.retries ? client.retry(id)
+                         : client.get(id),
+         options.json);
     return kDone;
   }
   const OrderPage page = client.list(asked.state, asked.rule, options.cursor);
   if (options.json) {
-    std::cout << to_json(page.orders, page.next) << '\n';
+    print_json(to_json(page.orders, page.next));
     return kDone;
   }
-  for (const Order& each : page.orders) show(each);
-  if (!page.next.empty()) std::cerr << "More: isomesh orders --cursor " << page.next << '\n';
+  for (const Order& each : page.orders) print(report_of(each));
+  tell_next("isomesh orders", page.next);
   return kDone;
 }
 
@@ -243,7 +231,7 @@ void add_search_options(CLI::App& app, SearchOptions& search) {
 int search(OrderClient& client, const Options& options, const SearchOptions& asked) {
   const PacsSeriesList found = client.search(asked.pacs, asked.query);
   if (options.json) {
-    std::cout << to_json(found) << '\n';
+    print_json(to_json(found));
     return kDone;
   }
   std::vector<std::vector<std::string>> rows = {
@@ -256,12 +244,12 @@ int search(OrderClient& client, const Options& options, const SearchOptions& ask
   if (!found.series.empty()) {
     std::vector<Align> columns(rows.front().size(), Align::kLeft);
     columns[4] = Align::kRight;
-    std::cout << in_columns(columns, std::move(rows));
+    print(in_columns(columns, std::move(rows)));
   }
   if (!found.complete) {
-    std::cerr << "The PACS has more studies than were listed: narrow the search\n";
+    remark("The PACS has more studies than were listed: narrow the search");
   } else if (found.series.empty()) {
-    std::cerr << "The PACS has no such series\n";
+    remark("The PACS has no such series");
   }
   return kDone;
 }
@@ -273,16 +261,15 @@ int pacs(Client& client, const Options& options, const SearchOptions& asked) {
   }
   const std::vector<PacsStatus> all = OrderClient(client).pacs();
   if (options.json) {
-    std::cout << to_json(all) << '\n';
+    print_json(to_json(all));
     return kDone;
   }
   for (const PacsStatus& each : all) {
-    std::cout << each.name << "  last success " << each.last_success.value_or("never");
+    std::string line = each.name + "  last success " + each.last_success.value_or("never");
     if (each.last_failure) {
-      std::cout << "  last failure " << *each.last_failure << " ("
-                << printable(each.reason.value_or("?")) << ')';
+      line += "  last failure " + *each.last_failure + " (" + each.reason.value_or("?") + ')';
     }
-    std::cout << '\n';
+    print(printable(line) + '\n');
   }
   return kDone;
 }
@@ -330,8 +317,7 @@ Added order_commands() {
                   Client& client,
                   const Options& options) { return pacs(client, options, *search_options); }}};
   added.ids = {{.operand = "ORDER", .kind = "orders", .newest = [](Client& client) {
-                  OrderClient orders(client);
-                  return candidates(orders, true);
+                  return candidates_of(OrderClient(client).list().orders);
                 }}};
   return added;
 }

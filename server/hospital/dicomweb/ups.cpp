@@ -21,6 +21,7 @@ FoundWorkitem workitem_of(const PeersObject& object) {
   return {.uid = object.instance,
           .state = object.workitem_state,
           .readiness = object.readiness,
+          .patient_id = object.patient_id,
           .study = object.study,
           .series = object.series,
           .procedures = object.procedures};
@@ -46,8 +47,8 @@ std::vector<FoundWorkitem> Ups::find_scheduled(const std::stop_token& stop) {
             .has_more = head.has_more_results};
   };
   const SearchResults results =
-      search_all({.target = "/workitems?ProcedureStepState=SCHEDULED&includefield=00404018&"
-                            "includefield=00404021&includefield=00404041",
+      search_all({.target = "/workitems?ProcedureStepState=SCHEDULED&includefield=00100020&"
+                            "includefield=00404018&includefield=00404021&includefield=00404041",
                   .uid = &PeersObject::instance},
                  fetch);
   std::vector<FoundWorkitem> found;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 
+#include "base/error.h"
 #include "server/hospital/objects/uid.h"
 
 namespace isomesh::dicom {
@@ -25,17 +27,32 @@ bool is_long(std::string_view vr) {
   return std::ranges::find(kLong, vr) != kLong.end();
 }
 
+// A length that is cut would make bytes of the value look like the elements after it.
+void check_length(Tag tag, std::uint64_t bytes, bool has_long_length) {
+  constexpr std::uint64_t kMostShort = 0xFFFE;
+  constexpr std::uint64_t kMostLong = 0xFFFFFFFE;
+  const std::uint64_t most = has_long_length ? kMostLong : kMostShort;
+  if (bytes <= most) return;
+  std::array<char, 16> name = {};
+  std::snprintf(name.data(), name.size(), "(%04X,%04X)", tag >> 16, tag & 0xffff);
+  throw Error(ErrorCode::kTooLarge, std::string("the attribute ") + name.data() +
+                                        " of the object would have " + std::to_string(bytes) +
+                                        " bytes, but can have at most " + std::to_string(most));
+}
+
 }  // namespace
 
-std::string element_head(Tag tag, std::string_view vr, std::uint32_t bytes) {
+std::string element_head(Tag tag, std::string_view vr, std::uint64_t bytes) {
+  check_length(tag, bytes, is_long(vr));
+  const auto length = static_cast<std::uint32_t>(bytes);
   std::string head;
   append_tag(tag, head);
   head += vr;
   if (is_long(vr)) {
     append_number(0, 2, head);
-    append_number(bytes, 4, head);
+    append_number(length, 4, head);
   } else {
-    append_number(bytes, 2, head);
+    append_number(length, 2, head);
   }
   return head;
 }
@@ -64,6 +81,7 @@ void DataSet::set_bytes(Tag tag, std::string_view vr, std::string_view bytes) {
 void DataSet::append_item(const DataSet& item, std::string& bytes) {
   constexpr Tag kItem = 0xFFFEE000;
   const std::string content = item.bytes();
+  check_length(kItem, content.size(), true);
   append_tag(kItem, bytes);
   append_number(static_cast<std::uint32_t>(content.size()), 4, bytes);
   bytes += content;
@@ -76,7 +94,7 @@ void DataSet::set_sequence(Tag tag, const std::vector<DataSet>& items) {
 }
 
 void DataSet::append(Tag tag, const Element& element, std::string& bytes) {
-  bytes += element_head(tag, element.vr, static_cast<std::uint32_t>(element.value.size()));
+  bytes += element_head(tag, element.vr, element.value.size());
   bytes += element.value;
 }
 

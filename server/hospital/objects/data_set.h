@@ -14,7 +14,8 @@ using Tag = std::uint32_t;
 
 // Elements by tag, so they are written in ascending order as DICOM requires, whatever the order of
 // the calls. Values are bytes as in the file; texts are UTF-8. The caller ensures that values are
-// valid for their value representation.
+// valid for their value representation. What writes bytes throws Error kTooLarge, with the tag, for
+// a value that is longer than its element can be.
 class DataSet {
  public:
   // Sets a text, padded to an even length; backslashes separate several values.
@@ -42,8 +43,9 @@ class DataSet {
   std::map<Tag, Element> elements_;
 };
 
-// The header of an element whose value has `bytes` bytes, an even number below 2^32 - 1.
-std::string element_head(Tag tag, std::string_view vr, std::uint32_t bytes);
+// The header of an element whose value has `bytes` bytes, an even number. Throws Error kTooLarge if
+// that is more than an element of that value representation can have.
+std::string element_head(Tag tag, std::string_view vr, std::uint64_t bytes);
 
 // The part of a DICOM file before its data set (PS3.10, 7.1): preamble, prefix and file meta
 // information. Pure function.

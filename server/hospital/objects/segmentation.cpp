@@ -170,12 +170,7 @@ void add_groups(const SegmentationObject& object, DataSet& data) {
 }
 
 void check_size(const SegmentationObject& object) {
-  if (object.frames.size() > kMostFrames) {
-    throw Error(ErrorCode::kTooLarge, "the segmentation has " +
-                                          std::to_string(object.frames.size()) +
-                                          " frames, but an object has at most " +
-                                          std::to_string(kMostFrames) + "; order fewer labels");
-  }
+  check_frames(object.frames.size());
   if (segmentation_pixel_bytes(object) > kMostDocumentBytes) {
     throw Error(ErrorCode::kTooLarge,
                 "the segmentation has more bytes than a DICOM object can hold; order fewer labels");
@@ -183,6 +178,13 @@ void check_size(const SegmentationObject& object) {
 }
 
 }  // namespace
+
+void check_frames(std::size_t frames) {
+  if (frames <= kMostFrames) return;
+  throw Error(ErrorCode::kTooLarge, "the segmentation has more than " +
+                                        std::to_string(kMostFrames) +
+                                        " frames, the most of an object; order fewer labels");
+}
 
 std::uint64_t segmentation_pixel_bytes(const SegmentationObject& object) {
   const std::uint64_t bits = std::uint64_t{object.dims[0]} * object.dims[1] * object.frames.size();

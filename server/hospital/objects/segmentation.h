@@ -39,6 +39,9 @@ struct SegmentationObject {
 // Memory of the functional groups: some hundred bytes for each frame.
 inline constexpr std::size_t kMostFrames = 65'536;
 
+// Throws Error kTooLarge for more frames than an object may have.
+void check_frames(std::size_t frames);
+
 // The bytes of the file before the pixel data, which are the last element. The bits of all frames
 // follow without gaps: the first sample in the lowest bit, the end padded to an even number of
 // bytes. Throws Error kTooLarge for more frames or bytes than an object may have.

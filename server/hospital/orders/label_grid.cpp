@@ -137,17 +137,20 @@ std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
   std::map<std::int64_t, std::size_t> places;
   for (std::size_t place = 0; place < labels.size(); ++place) places[labels[place]] = place;
   std::vector<std::vector<std::uint32_t>> slices(labels.size());
+  std::size_t count = 0;
   SliceReader reader(grid, blobs);
   for (std::uint32_t slice = 0; slice < grid.dims[2]; ++slice) {
     check(stop);
-    std::int64_t last = 0;
+    std::optional<std::int64_t> last;
     for (const std::int64_t label : reader.read(slice)) {
       if (label == last) continue;
       last = label;
       const auto found = places.find(label);
       if (found == places.end()) continue;
       std::vector<std::uint32_t>& known = slices[found->second];
-      if (known.empty() || known.back() != slice) known.push_back(slice);
+      if (!known.empty() && known.back() == slice) continue;
+      known.push_back(slice);
+      dicom::check_frames(++count);
     }
   }
   std::vector<dicom::SegmentationFrame> frames;

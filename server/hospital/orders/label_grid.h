@@ -31,7 +31,8 @@ LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>&
                      const Volume& labels);
 
 // The slices where the segments have samples, by segment, then by slice. `labels` are those of the
-// segments. Throws Error kCancelled, and kInternal if the blob is damaged.
+// segments. Throws Error kCancelled, kTooLarge for more frames than an object may have, and
+// kInternal if the blob is damaged.
 std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
                                                 std::span<const std::int64_t> labels,
                                                 const store::BlobStore& blobs,

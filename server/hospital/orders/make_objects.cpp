@@ -125,10 +125,7 @@ std::string instance_uid_of(const MadeObject& object, const DicomIdentity& ident
 // Truncates to 64 characters, the limit of LO.
 std::string in_short(const std::string& text) {
   constexpr std::size_t kLongest = 64;
-  if (text.size() <= kLongest) return text;
-  std::size_t end = kLongest;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
-  return text.substr(0, end);
+  return std::string(beginning(text, kLongest));
 }
 
 std::string without_backslashes(std::string text) {
@@ -140,6 +137,18 @@ std::string without_backslashes(std::string text) {
 double rounded_up(double mm) {
   constexpr double kThousandths = 1000;
   return std::ceil(mm * kThousandths) / kThousandths;
+}
+
+// As an object tells them: AlgorithmParameters has at most 10 240 characters (LT). The names and
+// colours of labels stand elsewhere in the objects.
+std::string told_parameters(MeshParameters parameters, SendFormat format) {
+  constexpr std::size_t kLongest = 10'240;
+  constexpr std::string_view kMore = "...";
+  parameters.label_names.clear();
+  parameters.label_colors.clear();
+  std::string text = without_backslashes(canonical_parameters(std::move(parameters), format));
+  if (text.size() <= kLongest) return text;
+  return std::string(beginning(text, kLongest - kMore.size())) + std::string(kMore);
 }
 
 std::string description_of(const Job& job) {
@@ -221,14 +230,14 @@ dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
       document.label ? record.work.label + ' ' + document.name : record.work.label;
   dicom::DerivedObject common = common_of(record, making, object, title);
   common.instance_number = document.number;
-  return dicom::make_envelope({.kind = document.kind,
-                               .common = std::move(common),
-                               .content_description = description_of(job),
-                               .algorithm_parameters = without_backslashes(
-                                   canonical_parameters(job.parameters, document.format)),
-                               .segment = segment_of(identity, document),
-                               .materials_uid = document.materials_uid},
-                              document.size());
+  return dicom::make_envelope(
+      {.kind = document.kind,
+       .common = std::move(common),
+       .content_description = description_of(job),
+       .algorithm_parameters = told_parameters(job.parameters, document.format),
+       .segment = segment_of(identity, document),
+       .materials_uid = document.materials_uid},
+      document.size());
 }
 
 std::optional<dicom::Deviation> deviation_of(const Job& job) {
@@ -247,12 +256,11 @@ std::string report_of(const store::OrderRecord& record, const Job& job, const Ma
   object.series_uid = series_uid_of(identity, job, making, object.format);
   auto surfaces = measure_surfaces(job, identity, record.work.label, blobs, making.stop);
   object.sop_instance_uid = instance_uid_of(object, identity, text_of(surfaces));
-  return dicom::make_report(
-      {.common = common_of(record, making, object, record.work.label),
-       .segmented_series_uid = record.work.segmented_series,
-       .algorithm_parameters = canonical_parameters(job.parameters, object.format),
-       .deviation = deviation_of(job),
-       .surfaces = std::move(surfaces)});
+  return dicom::make_report({.common = common_of(record, making, object, record.work.label),
+                             .segmented_series_uid = record.work.segmented_series,
+                             .algorithm_parameters = told_parameters(job.parameters, object.format),
+                             .deviation = deviation_of(job),
+                             .surfaces = std::move(surfaces)});
 }
 
 [[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <random>
+#include <set>
 
 #include "base/clock.h"
 #include "base/log.h"
@@ -48,6 +49,16 @@ bool may_pass(ErrorCode code) {
   }
 }
 
+// The names of those that rules watch for series or workitems.
+std::set<std::string> watched_pacs(const std::vector<Rule>& rules) {
+  std::set<std::string> all;
+  for (const Rule& rule : rules) {
+    if (rule.watch) all.insert(*rule.watch);
+    if (rule.worklist) all.insert(*rule.worklist);
+  }
+  return all;
+}
+
 }  // namespace
 
 Orders::Orders(const OrderServices& services, const HospitalSettings& settings,
@@ -57,7 +68,10 @@ Orders::Orders(const OrderServices& services, const HospitalSettings& settings,
       options_(std::move(options)),
       steps_(services, settings, options_.now) {
   services_.audit.add({.event = store::AuditEvent::kStart});
-  for (const PacsSettings& each : settings_.pacs) status_[each.name].name = each.name;
+  for (const PacsSettings& each : settings_.pacs) {
+    status_[each.name].name = each.name;
+    for (const PacsFault fault : kPacsFaults) failed_[{each.name, fault}] = 0;
+  }
   look_at_jobs();
   try {
     if (options_.keep_orders) {
@@ -66,7 +80,10 @@ Orders::Orders(const OrderServices& services, const HospitalSettings& settings,
     for (std::size_t n = 0; n < options_.threads; ++n) {
       threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
     }
-    threads_.emplace_back([this](const std::stop_token& stop) { watch(stop); });
+    for (const std::string& pacs : watched_pacs(settings_.rules)) {
+      threads_.emplace_back([this, pacs](const std::stop_token& stop) { watch(pacs, stop); });
+    }
+    threads_.emplace_back([this](const std::stop_token& stop) { forget_ended(stop); });
     if (settings_.dimse) {
       threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
     }
@@ -389,8 +406,10 @@ void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Erro
   const bool is_over = now - time_of(record.work.begun) >= settings_.give_up;
   if (!may_pass || is_over) return end(record, error);
   Order& order = record.order;
+  // A PACS may ask for any time.
   const milliseconds delay =
-      std::max<milliseconds>(delay_after(record.work.failures, settings_), retry_after);
+      std::max<milliseconds>(delay_after(record.work.failures, settings_),
+                             std::min<seconds>(retry_after, store::kLongestWait));
   ++record.work.failures;
   record.work.failed_in = std::max(record.work.failed_in, std::optional(failed));
   ++order.attempts;

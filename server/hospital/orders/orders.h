@@ -16,7 +16,7 @@
 
 namespace isomesh::orders {
 
-// Counts of failed attempts, for the metrics.
+// Counts of failed attempts, for the metrics. Those of configured PACS begin with 0.
 struct Attempts {
   std::string pacs;
   PacsFault fault = PacsFault::kUnreachable;
@@ -116,7 +116,8 @@ class Orders {
   // Makes orders due whose jobs may have ended while no process waited for them.
   void look_at_jobs();
   void work(const std::stop_token& stop);
-  void watch(const std::stop_token& stop);
+  void watch(const std::string& pacs, const std::stop_token& stop);
+  void forget_ended(const std::stop_token& stop);
   void forget();
   void receive(const std::stop_token& stop);
   store::ReceivedFate look_at_received(const store::HeldSeries& series);

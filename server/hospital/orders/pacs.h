@@ -1,6 +1,7 @@
 // Interfaces to a PACS, independent of the protocol.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -31,6 +32,11 @@ enum class PacsFault {
   kNotStored,     // storage not confirmed, or not found afterwards
   kChanged,       // the study is missing or belongs to another patient now
 };
+
+inline constexpr std::array kPacsFaults = {
+    PacsFault::kUnreachable,  PacsFault::kTimeout,   PacsFault::kBusy,
+    PacsFault::kUnauthorized, PacsFault::kRefused,   PacsFault::kUnreadable,
+    PacsFault::kIncomplete,   PacsFault::kNotStored, PacsFault::kChanged};
 
 std::string_view to_string(PacsFault fault);
 
@@ -141,9 +147,10 @@ class ObjectReceiver {
 
 struct FoundWorkitem {
   std::string uid;
-  std::string state;      // "SCHEDULED" and so on
-  std::string readiness;  // of its input: "READY" and so on
-  std::string study;      // of its only input; empty if there are several or none
+  std::string state;            // "SCHEDULED" and so on
+  std::string readiness;        // of its input: "READY" and so on
+  std::string patient_id = {};  // empty: unknown
+  std::string study;            // of its only input; empty if there are several or none
   std::string series;
   std::vector<std::string> procedures;  // VALUE^SCHEME^MEANING
 };

@@ -16,9 +16,7 @@ std::size_t character_bytes(std::string_view text, std::size_t at) {
   return end - at;
 }
 
-}  // namespace
-
-bool matches(std::string_view pattern, std::string_view text) {
+bool matches_by(std::string_view pattern, std::string_view text, bool (*are_equal)(char, char)) {
   // The last * seen, and the end of the text it matches so far: backtracking only ever extends that
   // match.
   std::size_t star = std::string_view::npos;
@@ -32,7 +30,7 @@ bool matches(std::string_view pattern, std::string_view text) {
     } else if (p < pattern.size() && pattern[p] == '?') {
       ++p;
       t += character_bytes(text, t);
-    } else if (p < pattern.size() && lower_of(pattern[p]) == lower_of(text[t])) {
+    } else if (p < pattern.size() && are_equal(pattern[p], text[t])) {
       ++p;
       ++t;
     } else if (star != std::string_view::npos) {
@@ -43,6 +41,16 @@ bool matches(std::string_view pattern, std::string_view text) {
     }
   }
   return pattern.substr(p).find_first_not_of('*') == std::string_view::npos;
+}
+
+}  // namespace
+
+bool matches(std::string_view pattern, std::string_view text) {
+  return matches_by(pattern, text, [](char a, char b) { return lower_of(a) == lower_of(b); });
+}
+
+bool matches_case(std::string_view pattern, std::string_view text) {
+  return matches_by(pattern, text, [](char a, char b) { return a == b; });
 }
 
 }  // namespace isomesh::orders

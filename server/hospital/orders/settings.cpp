@@ -13,13 +13,15 @@
 #include "proto/error.h"
 #include "server/hospital/dimse/message.h"
 #include "server/hospital/orders/section.h"
+#include "server/hospital/records/order_store.h"
 
 namespace isomesh::orders {
 namespace {
 
 using std::chrono::seconds;
 
-constexpr std::int64_t kMostSeconds = 30 * 24 * 3600;
+// As an order may wait for the longest of these times.
+constexpr std::int64_t kMostSeconds = seconds(store::kLongestWait).count();
 
 // Reads a text that becomes the value of a DICOM element with the value representation LO.
 void read_long_string(Section& section, std::string_view key, std::string& text) {
@@ -270,6 +272,22 @@ DimseSettings read_dimse(Section section) {
   return dimse;
 }
 
+// Reads HOST or HOST:PORT, with brackets around an IPv6 address that are no part of the host.
+// Returns false for anything else.
+bool read_authority(std::string_view text, SyslogSettings& syslog) {
+  const bool has_brackets = text.starts_with('[');
+  const std::size_t colon = text.rfind(':');
+  const std::size_t end = has_brackets ? text.find(']') : std::min(colon, text.size());
+  if (end == text.npos) return false;
+  syslog.host = text.substr(0, end).substr(has_brackets ? 1 : 0);
+  const std::string_view rest = text.substr(end + (has_brackets ? 1 : 0));
+  if (syslog.host.empty() || rest.empty()) return !syslog.host.empty();
+  const auto port = rest.starts_with(':') ? parse_uint64(rest.substr(1)) : std::nullopt;
+  if (!port || *port == 0 || *port > 65535) return false;
+  syslog.port = static_cast<std::uint16_t>(*port);
+  return true;
+}
+
 std::optional<SyslogSettings> read_audit(Section section) {
   SyslogSettings syslog;
   std::string url;
@@ -279,16 +297,10 @@ std::optional<SyslogSettings> read_audit(Section section) {
   section.finish();
   section.require("syslog", url);
   constexpr std::string_view kScheme = "tls://";
-  const std::size_t colon = url.rfind(':');
-  const bool has_port = colon != std::string::npos && colon >= kScheme.size();
-  const auto port =
-      has_port ? parse_uint64(url.substr(colon + 1)) : std::optional<std::uint64_t>(syslog.port);
-  if (!url.starts_with(kScheme) || !port || *port == 0 || *port > 65535) {
+  if (!url.starts_with(kScheme) ||
+      !read_authority(std::string_view(url).substr(kScheme.size()), syslog)) {
     refuse(section.key_of("syslog"), "must be tls://HOST or tls://HOST:PORT");
   }
-  syslog.port = static_cast<std::uint16_t>(*port);
-  syslog.host = url.substr(kScheme.size(), has_port ? colon - kScheme.size() : std::string::npos);
-  section.require("syslog", syslog.host);
   return syslog;
 }
 

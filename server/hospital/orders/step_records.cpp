@@ -22,6 +22,14 @@ void check_identity(const DicomIdentity& identity) {
   }
 }
 
+void check_patient_of_workitem(const OrderWork& work, const DicomIdentity& identity) {
+  if (!work.workitem || work.workitem->patient_id.empty()) return;
+  if (work.workitem->patient_id == identity.patient_id) return;
+  throw Error(ErrorCode::kUnusableVolume,
+              "the images have another Patient ID than the workitem: correct what is wrong, and "
+              "schedule a new workitem");
+}
+
 store::AuditEntry transfer(const store::OrderRecord& record, const std::string& pacs,
                            const std::string& direction, const std::string& study) {
   return {.event = store::AuditEvent::kTransferred,

@@ -12,6 +12,10 @@ namespace isomesh::orders {
 // one. Throws Error kUnusableVolume.
 void check_identity(const DicomIdentity& identity);
 
+// What is made of one patient's images must not complete the workitem of another one. Throws Error
+// kUnusableVolume.
+void check_patient_of_workitem(const OrderWork& work, const DicomIdentity& identity);
+
 // An entry of the audit trail that has not succeeded yet.
 store::AuditEntry transfer(const store::OrderRecord& record, const std::string& pacs,
                            const std::string& direction, const std::string& study);

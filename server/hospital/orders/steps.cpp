@@ -135,6 +135,7 @@ std::optional<bool> OrderSteps::has_instance(const std::string& pacs, const Inst
 }
 
 Time OrderSteps::save(store::OrderRecord& record, Time next) const {
+  next = std::min(next, now_() + store::kLongestWait);
   record.order.next_attempt.reset();
   if (!services_.orders.save(record, next)) throw OrderIsOver();
   return next;
@@ -230,6 +231,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
     entry.patient_id = volume.dicom->patient_id;
     services_.audit.add(entry);
     if (!record.order.send.empty()) check_identity(*volume.dicom);
+    check_patient_of_workitem(record.work, *volume.dicom);
     record.order.volume = volume.id;
     record.work.identity = volume.dicom;
     if (record.order.label_volume) {

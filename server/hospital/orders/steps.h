@@ -103,7 +103,7 @@ class OrderSteps {
   // yet. Throws PacsFailure kNotStored after some time.
   store::Time look_again(store::OrderRecord& record, std::size_t index) const;
   // Saves the order after `step` has succeeded, and resets failures of that and earlier steps.
-  // Returns `next`. Throws OrderIsOver.
+  // Returns `next`, or the time after kLongestWait if that is earlier. Throws OrderIsOver.
   store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;
   // As above, without resetting failures.
   store::Time save(store::OrderRecord& record, store::Time next) const;

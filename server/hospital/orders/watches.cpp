@@ -19,6 +19,17 @@ std::string day_before(store::Time now, std::uint32_t days) {
   return utc_text(now - std::chrono::days(days) - std::chrono::days(1), "%Y%m%d");
 }
 
+// How far back watches look, and at least a quarter of a year: a series that is forgotten before
+// would be ordered again.
+std::chrono::days longest_look(const std::vector<Rule>& rules) {
+  constexpr std::chrono::days kMargin{2};  // of dates without time zones
+  std::chrono::days longest{90};
+  for (const Rule& rule : rules) {
+    if (rule.watch) longest = std::max(longest, std::chrono::days(rule.match.days) + kMargin);
+  }
+  return longest;
+}
+
 bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {
   if (is_own_modality(series.modality)) return false;
   if (!match.modality.empty() && series.modality != match.modality) return false;
@@ -59,7 +70,7 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
           {.rule = rule.name,
            .study = series.study,
            .series = series.series,
-           .instances = series.instances.value_or(0)},
+           .instances = series.instances},
           settings_.most_open);
       if (!is_new) continue;
       // A watch repeats its query all day; only queries that led to orders are recorded.
@@ -109,7 +120,8 @@ void Orders::look_at_worklist(const Rule& rule, const std::stop_token& stop) {
       record.work.workitem = Workitem{.worklist = *rule.worklist,
                                       .uid = item.uid,
                                       .procedure = *procedure,
-                                      .transaction = dicom::name_based_uid(random_hex(32))};
+                                      .transaction = dicom::name_based_uid(random_hex(32)),
+                                      .patient_id = item.patient_id};
       // The key is the same for all attempts, also of other processes.
       const store::OrderSubmission submission =
           services_.orders.submit({.record = record,
@@ -126,17 +138,26 @@ void Orders::look_at_worklist(const Rule& rule, const std::stop_token& stop) {
   }
 }
 
-void Orders::watch(const std::stop_token& stop) {
-  store::Time next_forgetting = options_.now();
+// Each watched PACS has a thread, because it may take any time. So it gets the queries of its rules
+// one after another.
+void Orders::watch(const std::string& pacs, const std::stop_token& stop) {
+  const auto is_over = [&] { return stop.stop_requested() || is_paused(); };
   while (!stop.stop_requested()) {
     for (const Rule& rule : settings_.rules) {
-      if (rule.watch && !stop.stop_requested() && !is_paused()) look_at_rule(rule, stop);
-      if (rule.worklist && !stop.stop_requested() && !is_paused()) look_at_worklist(rule, stop);
+      if (rule.watch == pacs && !is_over()) look_at_rule(rule, stop);
+      if (rule.worklist == pacs && !is_over()) look_at_worklist(rule, stop);
     }
+    isomesh::pause(stop, settings_.poll);
+  }
+}
+
+void Orders::forget_ended(const std::stop_token& stop) {
+  store::Time next = options_.now();
+  while (!stop.stop_requested()) {
     try {
       const store::Time now = options_.now();
-      if (now >= next_forgetting) {
-        next_forgetting = now + kForgetPause;
+      if (now >= next) {
+        next = now + kForgetPause;
         forget();
       }
     } catch (const std::exception& error) {
@@ -149,7 +170,8 @@ void Orders::watch(const std::stop_token& stop) {
 void Orders::forget() {
   const store::Time before =
       (options_.believed_now ? options_.believed_now() : options_.now()) - options_.keep;
-  const std::size_t orders = services_.orders.forget(before);
+  const std::size_t orders =
+      services_.orders.forget(before, before - longest_look(settings_.rules));
   const std::size_t instances = services_.received.forget(before);
   const std::size_t workitems = options_.forget_also ? options_.forget_also(before) : 0;
   if (orders + instances + workitems == 0) return;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/clock.h"
+#include "base/text.h"
 #include "proto/error.h"
 #include "server/hospital/orders/steps.h"
 
@@ -13,6 +14,7 @@ namespace isomesh::orders {
 namespace {
 
 using nlohmann::json;
+using store::Time;
 
 constexpr const char* kInProgress = "IN PROGRESS";
 constexpr const char* kCompleted = "COMPLETED";
@@ -148,6 +150,7 @@ std::string OrderSteps::performed(const store::OrderRecord& record) const {
     outputs.push_back(
         output_of(result, record.work.identity->study_uid, settings_.find_pacs(result.pacs)));
   }
+  constexpr std::size_t kLongestCode = 16;  // of a code value (SH)
   const std::string& station = settings_.station_name;
   json changes = with_transaction(item);
   changes["00741002"] = attribute("SQ", json::object({{"00741004", attribute("DS", 100)}}));
@@ -156,7 +159,8 @@ std::string OrderSteps::performed(const store::OrderRecord& record) const {
       {{"00404019", attribute("SQ", code_item(item.procedure.substr(0, scheme - 1),
                                               item.procedure.substr(scheme, meaning - scheme - 1),
                                               item.procedure.substr(meaning)))},
-       {"00404028", attribute("SQ", code_item(station.substr(0, 16), "99ISOMESH", station))},
+       {"00404028", attribute("SQ", code_item(std::string(beginning(station, kLongestCode)),
+                                              "99ISOMESH", station))},
        {"00404033", {{"vr", "SQ"}, {"Value", outputs}}},
        {"00404050", attribute("DT", moment(time_of(record.order.created)))},
        {"00404051", attribute("DT", moment(now_()))}});

@@ -83,6 +83,7 @@ void visit(Is<Workitem> auto& self, auto&& field) {
   field("claimed", self.claimed);
   field("told", self.told);
   field("ending", self.ending);
+  field("patient_id", self.patient_id);
 }
 
 void visit(Is<OrderWork> auto& self, auto&& field) {
@@ -270,7 +271,8 @@ PacsSeriesList pacs_series_from_json(std::string_view text) {
   return json_values::from_text<PacsSeriesList>(text);
 }
 
-std::string to_record(const OrderWork& work) { return json_values::to_text(work); }
+std::string to_record(const Order& order) { return json_values::record_of(order); }
+std::string to_record(const OrderWork& work) { return json_values::record_of(work); }
 Order order_from_record(std::string_view text) { return json_values::from_record<Order>(text); }
 OrderWork order_work_from_record(std::string_view text) {
   return json_values::from_record<OrderWork>(text);

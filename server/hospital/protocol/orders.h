@@ -112,6 +112,7 @@ struct Workitem {
   std::optional<OrderState> told = {};  // the last step that the worklist was told of
   // The end of the order, which it enters when the worklist was told of it.
   std::optional<OrderState> ending = {};
+  std::string patient_id = {};  // of its patient; empty if the worklist does not tell
 
   bool operator==(const Workitem&) const = default;
 };
@@ -220,6 +221,7 @@ PacsSeriesList pacs_series_from_json(std::string_view text);
 
 // For stores. Readers give missing members their defaults. They throw Error
 // kInternal.
+std::string to_record(const Order& order);
 std::string to_record(const OrderWork& work);
 Order order_from_record(std::string_view text);
 OrderWork order_work_from_record(std::string_view text);

@@ -28,7 +28,8 @@ void throw_damaged_order() {
 }
 
 bool is_done(const LastOrder& last, const WatchedSeries& series) {
-  if (last.instances == series.instances) return true;
+  // Without a number, nobody can tell whether instances have come since.
+  if (!series.instances || last.instances == *series.instances) return true;
   if (!last.state) return false;
   if (!is_final(*last.state)) return true;
   return last.order && last.order->source.instances == series.instances;

@@ -25,7 +25,8 @@ struct LastOrder {
   std::vector<std::string> contents = {};  // if it has ended; of the instances, as far as known
 };
 
-// True if no new order is needed: the last one is still open, or had that many instances.
+// True if no new order is needed: the last one is still open, or had that many instances, or nobody
+// knows how many there are.
 bool is_done(const LastOrder& last, const WatchedSeries& series);
 
 // Decides about a received series; `newest` is the time of its latest instance.

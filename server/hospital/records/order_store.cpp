@@ -95,7 +95,7 @@ void insert(SqlConnection& connection, const OrderSpec& spec) {
       "INSERT INTO orders(id, owner, state, rule, created, next, idempotency_key, request_digest, "
       "record, work) VALUES(?1, ?2, ?3, ?4, ?5, isomesh_now(), ?6, ?7, ?8, ?9)",
       order.id, spec.record.owner, order.state, order.rule, us_of_timestamp(order.created), key,
-      spec.request_digest, to_json(order), to_record(spec.record.work));
+      spec.request_digest, to_record(order), to_record(spec.record.work));
 }
 
 // The result of an earlier submission with the same key.
@@ -136,7 +136,7 @@ void insert_watched(SqlConnection& connection, const OrderSpec& spec, const Watc
       "INSERT INTO watched(rule, study, series, \"order\", instances, seen) VALUES(?1, ?2, ?3, ?4, "
       "?5, isomesh_kept(isomesh_now())) ON CONFLICT(rule, study, series) DO UPDATE SET \"order\" = "
       "excluded.\"order\", instances = excluded.instances, seen = excluded.seen",
-      series.rule, series.study, series.series, spec.record.order.id, series.instances);
+      series.rule, series.study, series.series, spec.record.order.id, series.instances.value_or(0));
 }
 
 std::vector<std::string> named_blobs(SqlConnection& connection, const std::string& id) {
@@ -165,7 +165,7 @@ void write(SqlConnection& connection, const OrderRecord& record,
       "UPDATE orders SET state = ?1, finished = CASE WHEN ?2 IS NULL THEN NULL ELSE "
       "isomesh_kept(?2) END, next = coalesce(?3, isomesh_now()), record = ?4, work = ?5 WHERE id = "
       "?6",
-      order.state, finished, next, to_json(order), to_record(record.work), order.id);
+      order.state, finished, next, to_record(order), to_record(record.work), order.id);
   name_blobs(connection, record);
 }
 
@@ -282,11 +282,12 @@ std::vector<Order> OrderStore::undamaged_after(const Viewer& viewer, const Order
 }
 
 std::vector<OrderRecord> OrderStore::due(Time now, std::size_t limit) const {
-  const std::string query = std::string(kColumns) + "WHERE state < 4 AND next <= ?1";
+  const std::string query = std::string(kColumns) + "WHERE state < 4 AND (next <= ?1 OR next > ?2)";
   const std::int64_t now_us = database_.to_us(now);
+  const std::int64_t longest_us = database_.to_us(now + kLongestWait);
   return list_despite_damage(
       [&] {
-        Rows rows = database_.query(query + " ORDER BY next LIMIT ?2", now_us, limit);
+        Rows rows = database_.query(query + " ORDER BY next LIMIT ?3", now_us, longest_us, limit);
         std::vector<OrderRecord> records;
         while (rows.next()) records.push_back(record_of(rows));
         return records;
@@ -296,7 +297,7 @@ std::vector<OrderRecord> OrderStore::due(Time now, std::size_t limit) const {
         const auto take = [&](const Rows& rows) {
           if (found.size() < limit) found.emplace(rows.text(3), record_of(rows));
         };
-        read_undamaged(database_, kOrderTable, query, take, now_us);
+        read_undamaged(database_, kOrderTable, query, take, now_us, longest_us);
         std::vector<OrderRecord> records;
         for (auto& [id, record] : found) records.push_back(std::move(record));
         return records;
@@ -304,8 +305,9 @@ std::vector<OrderRecord> OrderStore::due(Time now, std::size_t limit) const {
 }
 
 std::optional<OrderRecord> OrderStore::if_due(const std::string& id, Time now) const {
-  Rows rows = database_.query(std::string(kColumns) + "WHERE id = ?1 AND state < 4 AND next <= ?2",
-                              id, database_.to_us(now));
+  Rows rows = database_.query(
+      std::string(kColumns) + "WHERE id = ?1 AND state < 4 AND (next <= ?2 OR next > ?3)", id,
+      database_.to_us(now), database_.to_us(now + kLongestWait));
   if (!rows.next()) return std::nullopt;
   return record_of(rows);
 }
@@ -401,14 +403,12 @@ OrderCounts OrderStore::counts() const {
   });
 }
 
-std::size_t OrderStore::forget(Time before) {
+std::size_t OrderStore::forget(Time before, Time watched) {
   return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
     // Orders record their end by the clock of the process that carried them out.
     const std::size_t removed =
         transaction->run("DELETE FROM orders WHERE finished < ?1", to_us(before));
-    // Series older than this are beyond the period that watches query.
-    constexpr std::chrono::days kWatched{90};
-    transaction->run("DELETE FROM watched WHERE seen < ?1", database_.to_us(before - kWatched));
+    transaction->run("DELETE FROM watched WHERE seen < ?1", database_.to_us(watched));
     transaction.commit();
     return removed;
   });

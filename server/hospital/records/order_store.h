@@ -20,6 +20,9 @@
 
 namespace isomesh::store {
 
+// The longest time for which an order may wait for its next step.
+inline constexpr std::chrono::days kLongestWait{7};
+
 struct OrderRecord {
   std::string owner;
   Order order;
@@ -51,7 +54,7 @@ struct WatchedSeries {
   std::string rule;
   std::string study;
   std::string series;
-  std::uint32_t instances = 0;
+  std::optional<std::uint32_t> instances = {};  // empty: the PACS does not tell
   // For a received series: the contents of the instances that are held, as in OrderWork.
   std::vector<std::string> contents = {};
 };
@@ -99,7 +102,7 @@ class OrderStore {
   OrderSubmission submit(const OrderSpec& spec, std::size_t most_open);
 
   // Stores an order for a series found by a watch, unless one is open or was made for the same
-  // number of instances. Returns true if it did.
+  // number of instances, or for any if that is unknown. Returns true if it did.
   bool submit_watched(const OrderSpec& spec, const WatchedSeries& series, std::size_t most_open);
 
   // Stores an order for a received series whose latest instance came at `last`, unless one is open
@@ -116,18 +119,19 @@ class OrderStore {
   std::vector<Order> list(const Viewer& viewer, const OrderFilter& filter, const std::string& after,
                           std::size_t limit) const;
 
-  // Open orders that are due, longest overdue first.
+  // Open orders that are due, longest overdue first. An order that is due later than any waits is
+  // due now: the clock was set back.
   virtual std::vector<OrderRecord> due(Time now, std::size_t limit) const;
   // Returns the order if it is due.
   std::optional<OrderRecord> if_due(const std::string& id, Time now) const;
   // The earliest due time after `now` of an open order.
   virtual std::optional<Time> next_after(Time now) const;
 
-  // Saves a step and the time of the next one. From now on the order names exactly the blobs of its
-  // work; in a final state it names none. Entering a final state also adds its callback, in the
-  // same transaction. Returns false, without changes, if the order is already in a final state
-  // because it was cancelled or is to be cancelled, or if another process carries out the orders
-  // now.
+  // Saves a step and the time of the next one, which is at most kLongestWait away. From now on the
+  // order names exactly the blobs of its work; in a final state it names none. Entering a final
+  // state also adds its callback, in the same transaction. Returns false, without changes, if the
+  // order is already in a final state because it was cancelled or is to be cancelled, or if another
+  // process carries out the orders now.
   virtual bool save(const OrderRecord& record, Time next);
 
   // The blobs that the order names.
@@ -146,8 +150,9 @@ class OrderStore {
 
   OrderCounts counts() const;
 
-  // Removes orders that ended before that time. Returns their number.
-  std::size_t forget(Time before);
+  // Removes orders that ended before that time, and watched series of which the last order was made
+  // before `watched`. Returns the number of orders.
+  std::size_t forget(Time before, Time watched);
 
  private:
   std::vector<Order> list_after(const Viewer& viewer, const OrderFilter& filter,

@@ -18,7 +18,7 @@ struct WorkitemRecord {
   std::string uid;
   WorkitemState state = WorkitemState::kScheduled;
   std::string transaction = {};  // secret, never in the data; empty: not claimed
-  std::string data;              // an object of the DICOM JSON Model
+  std::string data;  // an object of the DICOM JSON Model, with a digest (record_digest.h)
 
   bool operator==(const WorkitemRecord&) const = default;
 };

@@ -4,9 +4,9 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <cstdio>
 #include <string_view>
 
-#include "base/clock.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "server/hospital/orders/pattern.h"
@@ -97,6 +97,24 @@ int number_at(std::string_view digits, std::size_t from, std::size_t count) {
   return number;
 }
 
+// As a DT has them. Not by the system's clock, whose nanoseconds end in 2262: some write 9999 for
+// no end.
+std::string digits_of(std::chrono::sys_time<std::chrono::minutes> time) {
+  using std::chrono::sys_days;
+  using std::chrono::year;
+  // A zone may lead beyond the years that have four digits.
+  time = std::clamp(time, decltype(time)(sys_days(year(0) / 1 / 1)),
+                    decltype(time)(sys_days(year(10'000) / 1 / 1)) - std::chrono::minutes(1));
+  const auto midnight = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::year_month_day day(midnight);
+  const std::chrono::hh_mm_ss clock(time - midnight);
+  std::array<char, 32> text = {};
+  std::snprintf(text.data(), text.size(), "%04d%02u%02u%02d%02d", static_cast<int>(day.year()),
+                static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()),
+                static_cast<int>(clock.hours().count()), static_cast<int>(clock.minutes().count()));
+  return text.data();
+}
+
 // A moment with a zone in UTC, as precisely as it is given; a day stays as it is, without its zone.
 std::string in_utc(std::string_view moment) {
   constexpr std::size_t kToHour = 10;
@@ -114,10 +132,11 @@ std::string in_utc(std::string_view moment) {
       std::chrono::month(static_cast<unsigned>(number_at(bare, 4, 2))),
       std::chrono::day(static_cast<unsigned>(number_at(bare, 6, 2))));
   if (!day.ok()) return std::string(bare);
-  const auto time = std::chrono::sys_days(day) + std::chrono::hours(number_at(bare, 8, 2)) +
-                    std::chrono::minutes(known == kToMinute ? number_at(bare, kToHour, 2) : 0) -
-                    (zone.front() == '-' ? -east : east);
-  return utc_text(time, "%Y%m%d%H%M").substr(0, known) + std::string(bare.substr(known));
+  const std::chrono::sys_time<std::chrono::minutes> time =
+      std::chrono::sys_days(day) + std::chrono::hours(number_at(bare, 8, 2)) +
+      std::chrono::minutes(known == kToMinute ? number_at(bare, kToHour, 2) : 0) -
+      (zone.front() == '-' ? -east : east);
+  return digits_of(time).substr(0, known) + std::string(bare.substr(known));
 }
 
 bool has_zone(std::string_view moment) { return without_zone(moment).size() < moment.size(); }
@@ -135,16 +154,22 @@ int compared(std::string_view left_moment, std::string_view right_moment) {
   return left.compare(0, length, right, 0, length);
 }
 
-// PS3.4, C.2.2.2.5: one moment, or a range with a hyphen.
-bool is_in_range(std::string_view wanted, std::string_view moment) {
-  // The hyphen of a zone has its digits behind it, and then that of the range or the end.
+// The hyphen of a range; npos for one moment. Only a DT has zones, and so hyphens of its own: each
+// has its digits behind it, and then that of the range or the end.
+std::size_t hyphen_of_range(std::string_view wanted, bool has_zones) {
   const auto is_of_zone = [&](std::size_t hyphen) {
     const std::size_t end = hyphen + 5;
-    return end <= wanted.size() && (end == wanted.size() || wanted[end] == '-') &&
+    return has_zones && end <= wanted.size() && (end == wanted.size() || wanted[end] == '-') &&
            without_zone(wanted.substr(0, end)).size() == hyphen;
   };
   std::size_t hyphen = wanted.find('-');
   while (hyphen != wanted.npos && is_of_zone(hyphen)) hyphen = wanted.find('-', hyphen + 1);
+  return hyphen;
+}
+
+// PS3.4, C.2.2.2.5: one moment, or a range with a hyphen.
+bool is_in_range(std::string_view wanted, std::string_view moment, bool has_zones) {
+  const std::size_t hyphen = hyphen_of_range(wanted, has_zones);
   if (hyphen == wanted.npos) return compared(wanted, moment) == 0;
   const std::string_view from = wanted.substr(0, hyphen);
   const std::string_view to = wanted.substr(hyphen + 1);
@@ -160,6 +185,7 @@ bool is_one_of(std::string_view wanted, std::string_view uid) {
   }
 }
 
+// Only names match whatever the case of letters (PS3.4, C.2.2.2.1): "a1" and "A1" are two patients.
 bool value_matches(const std::string& vr, const json& value, const std::string& wanted) {
   if (value.is_object()) {  // of a name: its groups
     return std::ranges::any_of(value, [&](const json& group) {
@@ -169,8 +195,14 @@ bool value_matches(const std::string& vr, const json& value, const std::string& 
   if (value.is_null()) return false;
   const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
   if (vr == "UI") return is_one_of(wanted, text);
-  if (vr == "DA" || vr == "DT" || vr == "TM") return is_in_range(wanted, text);
-  return orders::matches(wanted, text);
+  if (vr == "DT") {
+    // A plus sign that a client did not encode is a blank in the query of a URL.
+    std::string moments = wanted;
+    std::ranges::replace(moments, ' ', '+');
+    return is_in_range(moments, text, true);
+  }
+  if (vr == "DA" || vr == "TM") return is_in_range(wanted, text, false);
+  return orders::matches_case(wanted, text);
 }
 
 bool attribute_matches(const DataSet& data, const std::vector<std::string>& path, std::size_t at,
@@ -220,8 +252,9 @@ Query parse_query(const std::vector<std::pair<std::string, std::string>>& parame
     } else {
       std::vector<std::string> path;
       for (const std::string_view part : split(name, '.')) path.push_back(tag_of(name, part));
-      // An empty value matches everything.
-      if (!value.empty()) query.keys.emplace_back(std::move(path), value);
+      // An empty value matches everything, and so does * (PS3.4, C.2.2.2.4).
+      if (value.find_first_not_of('*') != value.npos)
+        query.keys.emplace_back(std::move(path), value);
       if (query.keys.size() > kMostKeys) throw invalid_parameter(name, "is one too many");
     }
   }

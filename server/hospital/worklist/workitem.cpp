@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "proto/dicom_uid.h"
+#include "proto/record_digest.h"
 #include "server/store/damaged_records.h"
 
 namespace isomesh::worklist {
@@ -67,7 +68,7 @@ void check_required(const DataSet& data) {
 void store_in(WorkitemRecord& record, DataSet& data, store::Time now) {
   data[kState] = attribute("CS", to_string(record.state));
   data[kModified] = attribute("DT", moment_of(now));
-  record.data = data.dump();
+  record.data = with_digest(data.dump());
   if (record.data.size() > kMostBodyBytes) {
     throw Error(ErrorCode::kTooLarge,
                 "the workitem would have more than " + std::to_string(kMostBodyBytes) + " bytes");
@@ -193,7 +194,7 @@ std::string already_in(WorkitemState state) {
 
 std::optional<DataSet> readable_data(const WorkitemRecord& record) {
   try {
-    return parse_data_set(record.data);
+    return parse_data_set(without_digest(record.data));
   } catch (const Error&) {
     store::report_damaged("workitem", record.uid);
     return std::nullopt;

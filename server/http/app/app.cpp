@@ -64,19 +64,11 @@ std::string unready_reason(const Services& services) {
   return services.blobs.has_room() ? "" : "the disk is full: nothing new is accepted";
 }
 
-// Rejects requests that are malformed for every route. The HTTP library would wait for a body of
-// unknown length.
+// Rejects requests that are malformed for every route.
 void check_request(const Request& request) {
   if (request.path.size() > limits::kLongestPath ||
       request.target.size() > limits::kLongestTarget) {
     throw Error(ErrorCode::kUriTooLong, "the request's path or query is too long");
-  }
-  const bool needs_body =
-      request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
-  const bool has_length =
-      request.has_header("Content-Length") || request.has_header("Transfer-Encoding");
-  if (needs_body && !has_length) {
-    throw Error(ErrorCode::kLengthRequired, "the request needs a Content-Length");
   }
 }
 
@@ -116,7 +108,8 @@ std::optional<Continuation> checked_answer(App& app, Request& request, Response&
 // service's either.
 void answer_failure(const store::DataFolder& folder, const Request& request, Response& response,
                     const Error& error) {
-  log_error("{} {} failed: {}", request.method, request.path, error.what());
+  log_error("{} {} failed ({}): {}", request.method, request.context.route,
+            request.context.trace.request_id(), error.what());
   answer_problem(request, response, folder.works() ? error : store::missing_folder());
 }
 
@@ -157,7 +150,7 @@ std::optional<Continuation> guarded(const store::DataFolder& folder, const Reque
     error.code() == ErrorCode::kInternal ? answer_failure(folder, request, response, error)
                                          : answer_problem(request, response, error);
   } catch (const std::bad_alloc&) {
-    log_error("{} {} failed: out of memory", request.method, request.path);
+    log_error("{} {} failed: out of memory", request.method, request.context.route);
     answer_problem(request, response,
                    Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
   } catch (const std::exception& error) {

@@ -15,17 +15,23 @@ bool is_below(std::string_view path, std::string_view folder) {
   return path == folder || (path.starts_with(folder) && path[folder.size()] == '/');
 }
 
-// Throws the same error for missing, malformed and unknown tokens, to give attackers no
-// information. Errors about a token of the provider tell its owner what to do.
-Caller caller_of(const Logins& logins, const Request& request) {
+// Sets who calls. Throws the same error for missing, malformed and unknown tokens, to give
+// attackers no information. Errors about a token of the provider tell its owner what to do.
+void log_in(const Logins& logins, const Request& request, RequestContext& context) {
   std::optional<std::string> token;
   if (request.count_headers("Authorization") == 1)
     token = bearer_of(request.header("Authorization"));
   if (token && logins.tokens != nullptr) {
-    if (const auto caller = logins.tokens->find(*token)) return *caller;
+    if (const auto caller = logins.tokens->find(*token)) {
+      context.caller = *caller;
+      return;
+    }
   }
   if (token && logins.provider != nullptr && oidc::is_web_token(*token)) {
-    return logins.provider->login_of(*token).caller;
+    const oidc::Login login = logins.provider->login_of(*token);
+    context.caller = login.caller;
+    context.login_ends = login.expires;
+    return;
   }
   throw Error(ErrorCode::kUnauthorized, "this request needs a valid token");
 }
@@ -62,7 +68,7 @@ void begin_request(const Logins& logins, Request& request, Response& response) {
   // Browsers send preflight requests (OPTIONS) without the token.
   if (request.method == "OPTIONS" || (!is_metrics && !is_below(request.path, "/v1"))) return;
   try {
-    context.caller = caller_of(logins, request);
+    log_in(logins, request, context);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kUnauthorized) {
       response.set_header("WWW-Authenticate", "Bearer realm=\"isomesh\"");
@@ -76,13 +82,11 @@ std::function<bool()> validity_of(
     const Logins& logins, const Request& request,
     const std::function<std::chrono::system_clock::time_point()>& now) {
   if (!logins.are_required()) return [] { return true; };
+  // A login has been accepted; what is left to happen to it is that it ends.
+  if (const auto ends = request.context.login_ends) return [now, ends] { return now() < *ends; };
+  if (logins.tokens == nullptr) return [] { return false; };  // nobody is logged in
   std::string token = bearer_of(request.header("Authorization")).value_or("");
-  const Caller& caller = request.context.caller;
-  if (logins.tokens == nullptr || logins.tokens->find(token) != caller) {
-    // It has just been accepted; what is left to happen to it is that it expires.
-    return [now, expires = logins.provider->login_of(token).expires] { return now() < expires; };
-  }
-  return [tokens = logins.tokens, caller, token = std::move(token),
+  return [tokens = logins.tokens, caller = request.context.caller, token = std::move(token),
           checked = std::uint64_t{0}]() mutable {
     const std::uint64_t loads = tokens->loads();
     if (checked == loads) return true;

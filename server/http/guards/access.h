@@ -39,8 +39,8 @@ struct Logins {
 // kUnavailable as the provider does.
 void begin_request(const Logins& logins, Request& request, Response& response);
 
-// A check of whether the request's token is still valid, for responses that last. Always true
-// without logins. It must not outlive them.
+// A check of whether the token of a request that has begun is still valid, for responses that last.
+// Always true without logins. It must not outlive them.
 std::function<bool()> validity_of(const Logins& logins, const Request& request,
                                   const std::function<std::chrono::system_clock::time_point()>&
                                       now = std::chrono::system_clock::now);

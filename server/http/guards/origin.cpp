@@ -4,6 +4,9 @@
 #include <cstdint>
 #include <optional>
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
 #include "base/log.h"
 #include "base/text.h"
 #include "proto/error.h"
@@ -61,6 +64,12 @@ std::string host_of(std::string_view authority) {
   const std::string_view port = authority.substr(std::min(colon + 1, authority.size()));
   const bool is_port = std::ranges::all_of(port, [](char c) { return c >= '0' && c <= '9'; });
   return is_port ? lower(authority.substr(0, colon)) : "";
+}
+
+std::string host_named(const std::string& setting) {
+  in6_addr address = {};
+  const bool is_bare_v6 = ::inet_pton(AF_INET6, setting.c_str(), &address) == 1;
+  return host_of(is_bare_v6 ? '[' + setting + ']' : setting);
 }
 
 void check_origin(const OriginRules& rules, const Request& request) {

@@ -34,6 +34,10 @@ std::string origin_of(std::string_view address);
 // invalid.
 std::string host_of(std::string_view authority);
 
+// The host that a setting names, as host_of returns it from a request: with or without a port, and
+// an IPv6 address with or without brackets. Empty if it names none.
+std::string host_named(const std::string& setting);
+
 // Logs each origin once, up to a number of them: pages that the rules do not allow. Thread safe.
 class RefusedOrigins {
  public:

@@ -1,6 +1,7 @@
 #include "server/http/guards/read_trail.h"
 
 #include <algorithm>
+#include <iterator>
 #include <string_view>
 #include <utility>
 
@@ -12,6 +13,8 @@ namespace {
 
 // Windows that are open at the same time; beyond it, all are closed early.
 constexpr std::size_t kMostWindows = 10'000;
+// Counts that wait because the trail cannot be written to.
+constexpr std::size_t kMostCounts = 10'000;
 
 constexpr int kUnauthorized = 401;
 constexpr int kNotAllowed = 403;
@@ -45,16 +48,28 @@ ReadTrail::ReadTrail(const Stores& stores, std::chrono::milliseconds window)
         const std::chrono::milliseconds between = std::max(window_ / 10, decltype(window_)(1));
         while (!stop.stop_requested()) {
           pause(stop, between);
-          const Lock lock(mutex_);
-          close_windows(Clock::now());
+          {
+            const Lock lock(mutex_);
+            close_windows(Clock::now());
+          }
+          enter_counts(stop);
         }
       }) {}
 
 ReadTrail::~ReadTrail() {
+  is_ending_ = true;
   closing_.request_stop();
   closing_.join();
+  {
+    const Lock lock(mutex_);
+    close_windows(Clock::time_point::max());
+  }
+  enter_counts({});
+  const std::uint64_t refused = refusals_.end() + restrictions_.end();
   const Lock lock(mutex_);
-  close_windows(Clock::time_point::max());
+  if (counts_.empty() && refused == 0) return;
+  log_error("the audit trail lacks {} counts of readings and {} refused requests", counts_.size(),
+            refused);
 }
 
 // Every route below a volume or a job tells about its patient, except a job's state and events.
@@ -110,8 +125,8 @@ std::optional<store::AuditEntry> ReadTrail::entry_of(const Reading& reading) con
     entry.job = reading.id;
     entry.volume = job->parameters.volume;
   }
-  const auto volume = record_of([&] { return stores_.volumes.get(store::Viewer(), entry.volume); });
-  // The mesh of an erased volume may have a patient; earlier entries of the volume name them.
+  const auto volume = stores_.volumes.find(store::Viewer(), entry.volume);
+  // The mesh of a volume that is gone or damaged may have a patient; earlier entries name them.
   if (!volume) return reading.is_of_job ? std::optional(entry) : std::nullopt;
   if (!volume->dicom) return std::nullopt;
   entry.study = volume->dicom->study_uid;
@@ -119,66 +134,117 @@ std::optional<store::AuditEntry> ReadTrail::entry_of(const Reading& reading) con
   return entry;
 }
 
-bool ReadTrail::add(const store::AuditEntry& entry) const {
+bool ReadTrail::add(const store::AuditEntry& entry) {
+  if (gives_up_) return false;
   try {
     stores_.audit.add(entry);
     return true;
   } catch (const std::exception& error) {
     log_error("the audit trail cannot be written to: {}", error.what());
+    gives_up_ = is_ending_.load();
     return false;
   }
 }
 
-void ReadTrail::close_windows(Clock::time_point until) {
-  std::erase_if(windows_, [&](const auto& each) {
-    const Window& window = each.second;
-    if (window.end > until) return false;
-    if (!window.entry || window.counted == 0) return true;
-    store::AuditEntry entry = *window.entry;
-    entry.requests = window.counted;
-    return add(entry) || until == Clock::time_point::max();
-  });
+void ReadTrail::close(Windows::iterator window) {
+  auto& [end, entry, counted, is_open] = window->second;
+  if (entry && counted > 0) {
+    entry->requests = counted;
+    if (counts_.size() < kMostCounts) {
+      counts_.push_back(*std::move(entry));
+    } else {
+      log_error("the audit trail lacks a count of readings: too many wait for it");
+    }
+  }
+  windows_.erase(window);
 }
 
-void ReadTrail::note_refusal(const Request& request, store::AuditEvent event, const char* what,
-                             Throttle& throttle) {
-  const auto unlisted = throttle.permit();
-  if (!unlisted) return;
-  add({.event = event,
-       .success = false,
-       .peer = request.remote_address,
-       .unlisted = *unlisted,
-       .caller = request.context.caller.name,
-       .what = what});
+void ReadTrail::close_windows(Clock::time_point until) {
+  for (auto window = windows_.begin(); window != windows_.end();) {
+    const auto next = std::next(window);
+    if (window->second.is_open && window->second.end <= until) close(window);
+    window = next;
+  }
+}
+
+void ReadTrail::enter_counts(const std::stop_token& stop) {
+  Lock lock(mutex_);
+  while (!counts_.empty() && !stop.stop_requested()) {
+    const store::AuditEntry entry = counts_.front();
+    lock.unlock();
+    const bool is_entered = add(entry);
+    lock.lock();
+    counts_.pop_front();
+    if (is_entered) continue;
+    counts_.push_back(entry);  // the others do not wait for one that can never be entered
+    return;
+  }
+}
+
+Throttle<store::AuditEntry>::Tell ReadTrail::adder() {
+  return [this](store::AuditEntry entry, std::uint64_t others) {
+    entry.unlisted = others;
+    return add(entry);
+  };
+}
+
+void ReadTrail::enter_first(const Reading& reading) {
+  Window window = {.is_open = true};
+  bool is_entered = false;
+  try {
+    window.entry = entry_of(reading);
+    is_entered = !window.entry || add(*window.entry);
+  } catch (const std::exception& error) {
+    log_error("the audit trail has no entry for a reading: {}", error.what());
+  }
+  const Lock lock(mutex_);
+  window.end = Clock::now() + window_;
+  if (is_entered) {
+    windows_[reading] = std::move(window);
+  } else {
+    windows_.erase(reading);
+  }
+  entered_.notify_all();
 }
 
 void ReadTrail::note(const Request& request, const Response& response) {
   using store::AuditEvent;
+  const auto refused = [&](AuditEvent event, const char* what) {
+    return store::AuditEntry{.event = event,
+                             .success = false,
+                             .peer = request.remote_address,
+                             .caller = request.context.caller.name,
+                             .what = what};
+  };
   if (response.status == kUnauthorized) {
-    return note_refusal(request, AuditEvent::kAuthenticationFailure, "login", refusals_);
+    return refusals_.add(refused(AuditEvent::kAuthenticationFailure, "login"));
   }
   const auto reading = reading_of(request, response);
   // Only a login has a name: pages of other origins are rejected before they log in.
   if (!reading && response.status == kNotAllowed && !request.context.caller.name.empty()) {
-    return note_refusal(request, AuditEvent::kRestricted, "permission", restrictions_);
+    return restrictions_.add(refused(AuditEvent::kRestricted, "permission"));
   }
   if (!reading) return;
-  // Held while the entry is written, so that no response to the same reading is sent before.
-  const Lock lock(mutex_);
-  const auto found = windows_.find(*reading);
+  Lock lock(mutex_);
+  auto found = windows_.find(*reading);
+  if (found != windows_.end() && !found->second.is_open) {
+    // No response to the same reading is sent before its entry is written. If that fails, it is
+    // logged once for all of them.
+    entered_.wait(lock, [&]() ISOMESH_REQUIRES(mutex_) {
+      found = windows_.find(*reading);
+      return found == windows_.end() || found->second.is_open;
+    });
+    if (found == windows_.end()) return;
+  }
   if (found != windows_.end() && Clock::now() < found->second.end) {
     ++found->second.counted;
     return;
   }
-  if (found != windows_.end()) close_windows(Clock::now());
+  if (found != windows_.end()) close(found);
   if (windows_.size() >= kMostWindows) close_windows(Clock::time_point::max());
-  try {
-    std::optional<store::AuditEntry> entry = entry_of(*reading);
-    if (entry && !add(*entry)) return;
-    windows_[*reading] = {.end = Clock::now() + window_, .entry = std::move(entry)};
-  } catch (const std::exception& error) {
-    log_error("the audit trail has no entry for a reading: {}", error.what());
-  }
+  windows_[*reading] = {};
+  lock.unlock();
+  enter_first(*reading);
 }
 
 }  // namespace isomesh::http

@@ -2,9 +2,11 @@
 // tried what the token does not allow.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <compare>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -61,29 +63,42 @@ class ReadTrail {
   };
 
   struct Window {
-    Clock::time_point end;
-    std::optional<store::AuditEntry> entry;  // empty if there is no patient
-    std::uint64_t counted = 0;               // requests since the entry
+    Clock::time_point end = {};
+    std::optional<store::AuditEntry> entry = {};  // empty if there is no patient
+    std::uint64_t counted = 0;                    // requests since the entry
+    bool is_open = false;                         // otherwise its first reading is being entered
   };
+
+  using Windows = std::map<Reading, Window>;
 
   static std::optional<Reading> reading_of(const Request& request, const Response& response);
   // Empty if there is no patient.
   std::optional<store::AuditEntry> entry_of(const Reading& reading) const;
-  // One in a while: otherwise strangers could fill the trail.
-  void note_refusal(const Request& request, store::AuditEvent event, const char* what,
-                    Throttle& throttle);
-  // Returns false if the trail cannot be written to.
-  bool add(const store::AuditEntry& entry) const;
-  // Enters the counts of the windows that have ended by then, and closes those.
+  // Enters the first reading of a window, and opens the window.
+  void enter_first(const Reading& reading) ISOMESH_EXCLUDES(mutex_);
+  // Returns false if the trail cannot be written to, which may take seconds to find out. So at the
+  // end nothing more is tried after a failure.
+  bool add(const store::AuditEntry& entry);
+  // Closes the windows that have ended by then. Their counts are entered later, by a thread that no
+  // response waits for.
   void close_windows(Clock::time_point until) ISOMESH_REQUIRES(mutex_);
+  void close(Windows::iterator window) ISOMESH_REQUIRES(mutex_);
+  // Enters the counts, up to the first that cannot be entered, which becomes the last.
+  void enter_counts(const std::stop_token& stop) ISOMESH_EXCLUDES(mutex_);
+  Throttle<store::AuditEntry>::Tell adder();
 
   const Stores stores_;
   const std::chrono::milliseconds window_;
-  Throttle refusals_{std::chrono::seconds(1)};
-  Throttle restrictions_{std::chrono::seconds(1)};
+  std::atomic<bool> is_ending_ = false;
+  std::atomic<bool> gives_up_ = false;
+  // Strangers could fill the trail otherwise.
+  Throttle<store::AuditEntry> refusals_{std::chrono::seconds(1), adder()};
+  Throttle<store::AuditEntry> restrictions_{std::chrono::seconds(1), adder()};
   Mutex mutex_;
-  std::map<Reading, Window> windows_ ISOMESH_GUARDED_BY(mutex_);
-  std::jthread closing_;  // last: uses the other members
+  Condition entered_;
+  Windows windows_ ISOMESH_GUARDED_BY(mutex_);
+  std::deque<store::AuditEntry> counts_ ISOMESH_GUARDED_BY(mutex_);  // of closed windows
+  std::jthread closing_;                                             // last: uses the other members
 };
 
 }  // namespace isomesh::http

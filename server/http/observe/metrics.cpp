@@ -34,12 +34,13 @@ const Histogram::BucketBoundaries kStageSeconds = {
 constexpr std::array kPriorities = {Priority::kStat, Priority::kRoutine, Priority::kBulk};
 constexpr std::array kEnds = {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled};
 
+constexpr std::array<std::string_view, 7> kMethods = {"GET",     "HEAD", "POST", "DELETE",
+                                                      "OPTIONS", "PUT",  "PATCH"};
+constexpr std::string_view kOtherMethod = "other";
+constexpr int kFailure = 500;
+
 std::string_view known_method(std::string_view method) {
-  for (const std::string_view known :
-       {"GET", "HEAD", "POST", "DELETE", "OPTIONS", "PUT", "PATCH"}) {
-    if (method == known) return known;
-  }
-  return "other";
+  return std::ranges::count(kMethods, method) > 0 ? method : kOtherMethod;
 }
 
 std::string status_class(int status) {
@@ -139,6 +140,11 @@ struct Metrics::State {
   }
 
   Family<Counter>& requests = counter("isomesh_http_requests_total", "Answered requests");
+  Counter& answered(std::string_view method, std::string_view route, int status) {
+    return requests.Add({{"method", std::string(known_method(method))},
+                         {"route", std::string(route)},
+                         {"status", status_class(status)}});
+  }
   Family<Histogram>& request_seconds = histogram(
       "isomesh_http_request_seconds", "Time from a request's head to the end of its response");
   Counter& bytes_in =
@@ -172,7 +178,6 @@ Metrics::Metrics() : state_(std::make_unique<State>()) {
   state_->gauge("isomesh_build_info", "Running version as a label; always 1")
       .Add({{"version", ISOMESH_VERSION}, {"mesher", codec::kMesherVersion}})
       .Set(1);
-  // Register counters at 0, because rates need a first sample.
   for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));
   const Timing none;
   visit(none, [&](const char* stage, double /*milliseconds*/) {
@@ -183,16 +188,20 @@ Metrics::Metrics() : state_(std::make_unique<State>()) {
         callbacks::CallbackOutcome::kGivenUp}) {
     state_->callbacks.Add(label("result", name_of(result)));
   }
+  for (const ErrorDescription& error : error_descriptions()) {
+    state_->failures.Add(label("reason", error.name));
+    state_->refused.Add(label("reason", error.name));
+  }
 }
 
 Metrics::~Metrics() = default;
 
+void Metrics::expect(std::string_view method, std::string_view route) {
+  state_->answered(method, route, kFailure);
+}
+
 void Metrics::count(const AnsweredRequest& request) {
-  state_->requests
-      .Add({{"method", std::string(known_method(request.method))},
-            {"route", std::string(request.route)},
-            {"status", status_class(request.status)}})
-      .Increment();
+  state_->answered(request.method, request.route, request.status).Increment();
   state_->request_seconds.Add(label("route", request.route), kRequestSeconds)
       .Observe(request.seconds);
   state_->bytes_in.Increment(static_cast<double>(request.bytes_in));

@@ -61,13 +61,17 @@ enum class MetricsFormat {
 
 std::string_view media_type_of(MetricsFormat format);
 
-// Thread safe.
+// Counters begin at 0 and not with their first event, because rates need a first sample. Thread
+// safe.
 class Metrics {
  public:
   Metrics();
   ~Metrics();
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;
+
+  // Begins to count the failures of a route.
+  void expect(std::string_view method, std::string_view route);
 
   void count(const AnsweredRequest& request);
   // A job in a final state.

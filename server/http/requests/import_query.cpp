@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <iterator>
 #include <limits>
 
 #include "base/text.h"
@@ -133,6 +134,14 @@ const std::set<std::string>& import_parameters() {
     return all;
   }();
   return names;
+}
+
+Parameters import_parameters_in(const Parameters& query) {
+  Parameters found;
+  std::ranges::copy_if(query, std::back_inserter(found), [](const auto& parameter) {
+    return import_parameters().contains(parameter.first);
+  });
+  return found;
 }
 
 ImportOptions import_options_of(const Request& request) {

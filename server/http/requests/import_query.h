@@ -26,6 +26,9 @@ ImportOptions import_options_of(const Request& request);
 // The names of the parameters that import_options_of reads.
 const std::set<std::string>& import_parameters();
 
+// Those of a query.
+Parameters import_parameters_in(const Parameters& query);
+
 // The name in a Content-Disposition header (RFC 6266), in UTF-8, without control characters,
 // truncated to the limit; empty if missing. The parameter `name` is a chosen one, `filename` the
 // file's, whose folders are removed.

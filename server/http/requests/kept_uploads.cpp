@@ -119,12 +119,6 @@ KeptUploads::Partial KeptUploads::partial_of(const std::string& owner, const std
   return found(owner, name)->partial;
 }
 
-std::string KeptUploads::became(const std::string& owner, const std::string& name) {
-  const Lock lock(mutex_);
-  const auto entry = found(owner, name);
-  return entry->partial ? entry->partial->note().volume : std::string();
-}
-
 KeptUploads::Entries::iterator KeptUploads::look_up(const std::string& owner,
                                                     const std::string& name) {
   return std::ranges::find_if(
@@ -144,12 +138,12 @@ KeptUploads::Entries::iterator KeptUploads::found(const std::string& owner,
 }
 
 void KeptUploads::finish(const std::string& owner, const std::string& name,
-                         const std::string& volume) {
+                         const std::string& volume, const Parameters& read_with) {
   const Lock lock(mutex_);
   const auto entry = look_up(owner, name);
   if (entry == kept_.end()) return;
   if (!entry->partial) return erase(entry);
-  if (!volume.empty()) entry->partial->become(volume);
+  entry->partial->become(volume, read_with);
 }
 
 void KeptUploads::let_go(const std::string& owner, const std::string& name) {
@@ -178,9 +172,23 @@ void KeptUploads::let_all_go() {
   const Lock lock(mutex_);
   for (auto entry = kept_.begin(); entry != kept_.end();) {
     const auto next = std::next(entry);
-    if (!entry->partial || entry->is_idle()) erase(entry);
+    if (entry->may_go()) erase(entry);
     entry = next;
   }
+}
+
+std::uint64_t KeptUploads::idle_bytes() {
+  const auto size_of = [](const Entry& entry) {
+    std::error_code absent;
+    if (entry.partial) return entry.partial->bytes();
+    const std::uintmax_t size =
+        entry.upload ? std::filesystem::file_size(entry.upload->path, absent) : 0;
+    return absent ? 0 : std::uint64_t{size};
+  };
+  const Lock lock(mutex_);
+  std::uint64_t sum = 0;
+  for (const Entry& entry : kept_) sum += entry.may_go() ? size_of(entry) : 0;
+  return sum;
 }
 
 void KeptUploads::wake() {

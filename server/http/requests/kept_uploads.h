@@ -67,13 +67,10 @@ class KeptUploads {
   // The same, but null for uploads in one request.
   Partial partial_of(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
-  // The volume, as JSON, that a resumable upload has become; empty for all others.
-  std::string became(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
-
-  // Call after an upload was read. Deletes one that came in one request. Of a resumable upload
-  // keeps only its resulting volume, or all of it for several volumes ("").
-  void finish(const std::string& owner, const std::string& name, const std::string& volume)
-      ISOMESH_EXCLUDES(mutex_);
+  // Call after an upload has become a volume, given as JSON, with these options. Deletes an upload
+  // that came in one request. Of a resumable one, keeps only the volume and the options.
+  void finish(const std::string& owner, const std::string& name, const std::string& volume,
+              const Parameters& read_with) ISOMESH_EXCLUDES(mutex_);
 
   // A missing one is not an error.
   void let_go(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
@@ -83,8 +80,9 @@ class KeptUploads {
   std::vector<std::string> cancel(const std::string& owner, const std::string& name)
       ISOMESH_EXCLUDES(mutex_);
 
-  // Deletes all uploads that no client is sending, for lack of room.
+  // Deletes all uploads that no client is sending, for lack of room; and their size.
   void let_all_go() ISOMESH_EXCLUDES(mutex_);
+  std::uint64_t idle_bytes() ISOMESH_EXCLUDES(mutex_);
 
   // Checks for expired uploads; for tests with their own clock.
   void wake() ISOMESH_EXCLUDES(mutex_);
@@ -98,6 +96,7 @@ class KeptUploads {
     Clock::time_point until;
 
     bool is_idle() const { return partial && partial.use_count() == 1; }
+    bool may_go() const { return !partial || is_idle(); }
   };
   using Entries = std::list<Entry>;
 

@@ -36,6 +36,7 @@ struct StoredNote {
   std::string boot;
   PartialNote note;
   std::vector<std::array<std::string, 2>> query;
+  std::optional<std::vector<std::array<std::string, 2>>> read_with;  // older versions: missing
 };
 
 void visit(Is<StoredNote> auto& self, auto&& field) {
@@ -47,12 +48,15 @@ void visit(Is<StoredNote> auto& self, auto&& field) {
   field("sha256", self.note.sha256);
   field("complete", self.note.is_complete);
   field("volume", self.note.volume);
+  field("read_with", self.read_with);
   field("length", self.note.length);
 }
 
 std::string text_of(const PartialNote& note) {
-  StoredNote stored = {.boot = this_boot(), .note = note, .query = {}};
+  StoredNote stored = {.boot = this_boot(), .note = note, .query = {}, .read_with = {}};
   for (const auto& [name, value] : note.query) stored.query.push_back({name, value});
+  stored.read_with.emplace();
+  for (const auto& [name, value] : note.read_with) stored.read_with->push_back({name, value});
   return json_values::to_text(stored);
 }
 
@@ -71,6 +75,10 @@ PartialNote note_from(const std::filesystem::path& path) {
     throw Error(ErrorCode::kGone, "the machine was restarted since");
   }
   for (const auto& [name, value] : stored.query) stored.note.query.emplace_back(name, value);
+  if (!stored.read_with) stored.read_with = stored.query;
+  for (const auto& [name, value] : *stored.read_with) {
+    stored.note.read_with.emplace_back(name, value);
+  }
   return std::move(stored.note);
 }
 
@@ -199,9 +207,10 @@ void PartialUpload::complete(const Lease& lease) {
   write_note();
 }
 
-void PartialUpload::become(const std::string& volume) {
+void PartialUpload::become(const std::string& volume, const Parameters& read_with) {
   const Lock lock(mutex_);
   note_.volume = volume;
+  note_.read_with = read_with;
   write_note();
   bytes_ = 0;
   file_ = Descriptor();

@@ -27,7 +27,8 @@ struct PartialNote {
   std::string sha256;  // expected hash of all bytes, in hex; empty if unknown
   std::optional<std::uint64_t> length = {};
   bool is_complete = false;
-  std::string volume = {};  // the resulting volume as JSON; then the bytes are deleted
+  std::string volume = {};    // the resulting volume as JSON; then the bytes are deleted
+  Parameters read_with = {};  // the options that it was read with
 
   bool operator==(const PartialNote&) const = default;
 };
@@ -81,8 +82,8 @@ class PartialUpload {
   void take_back(const Lease& lease) ISOMESH_EXCLUDES(mutex_);
   void complete(const Lease& lease) ISOMESH_EXCLUDES(mutex_);
 
-  // Records the resulting volume and deletes the bytes.
-  void become(const std::string& volume) ISOMESH_EXCLUDES(mutex_);
+  // Records the resulting volume and the options that it was read with, and deletes the bytes.
+  void become(const std::string& volume, const Parameters& read_with) ISOMESH_EXCLUDES(mutex_);
 
   // Deletes both files with this object.
   void let_go() ISOMESH_EXCLUDES(mutex_);

@@ -73,6 +73,10 @@ std::string Request::path_parameter(std::string_view name) const {
   return std::string(text_of(find(path_parameters, name)));
 }
 
+bool Request::has_body() const {
+  return content_length.value_or(0) > 0 || has_header("Transfer-Encoding");
+}
+
 bool Request::is_form() const {
   return net::equal_names(split(header("Content-Type"), ';').front(), "multipart/form-data");
 }

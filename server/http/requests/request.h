@@ -52,6 +52,8 @@ struct RequestContext {
       std::chrono::steady_clock::now();  // when its head was read
   Trace trace;
   Caller caller;
+  // The end of a provider's login; empty for the service's own tokens, and without logins.
+  std::optional<std::chrono::system_clock::time_point> login_ends = {};
   std::string_view route = kNoRoute;  // the pattern of its route; lives as long as the router
 };
 
@@ -106,6 +108,9 @@ struct Request {
 
   // The part of the path at {name} in the route's pattern.
   std::string path_parameter(std::string_view name) const;
+
+  // False if the request has no body, or an empty one.
+  bool has_body() const;
 
   // True for a form with fields (multipart/form-data).
   bool is_form() const;

@@ -211,8 +211,8 @@ std::optional<std::chrono::system_clock::time_point> instant_of(const Request& r
   std::string text(request.parameter(name));
   if (text.size() == kDay) text += "T00:00:00Z";
   if (text.size() == kSecond) text.insert(kSecond - 1, ".000");
-  const auto time = time_of(text);
-  if (timestamp_of(time) != text) {
+  const auto time = nearest_time_of(text);
+  if (!time) {
     throw invalid_parameter(
         name, "must be a day such as 2026-11-20, or a time in UTC such as 2026-11-20T07:30:00Z");
   }

@@ -20,7 +20,8 @@ namespace isomesh::http {
 namespace {
 
 // Inflated bodies would need limits of their own.
-void refuse_encoded(const Request& request) {
+void check_framing(const Request& request) {
+  check_has_length(request);
   const std::string_view encoding = request.header("Content-Encoding");
   if (!encoding.empty() && encoding != "identity") {
     throw Error(ErrorCode::kUnsupportedMedia,
@@ -171,7 +172,7 @@ class Receiver {
 Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
                const std::atomic<bool>& stopping, const Request& request)
     : file_(folder.scratch(), ".upload") {
-  refuse_encoded(request);
+  check_framing(request);
   check_length(request, limits.max_bytes);
   check_room(folder, request);
   const bool is_form = request.is_form();
@@ -208,7 +209,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
 void receive_part(PartialUpload& upload, const PartialLease& lease, const store::DataFolder& folder,
                   const UploadLimits& limits, const std::atomic<bool>& stopping,
                   const Request& request) {
-  refuse_encoded(request);
+  check_framing(request);
   check_length(request, limits.max_bytes, lease.offset);
   check_room(folder, request);
   const std::optional<std::string> expected = sha256_of_content_digest(request);
@@ -223,8 +224,13 @@ void receive_part(PartialUpload& upload, const PartialLease& lease, const store:
   }
 }
 
+void check_has_length(const Request& request) {
+  if (request.content_length || request.has_body()) return;
+  throw Error(ErrorCode::kLengthRequired, "the request needs a Content-Length");
+}
+
 std::string read_text(const Request& request, std::size_t max_bytes) {
-  refuse_encoded(request);
+  check_framing(request);
   check_length(request, max_bytes);
   if (request.is_form()) {
     throw Error(ErrorCode::kUnsupportedMedia, "the body must be JSON, not a form");

@@ -25,6 +25,10 @@ struct ReceivedBody {
   import::UploadName name;
 };
 
+// Throws Error kLengthRequired if the request says nothing about its body: a client whose framing
+// was lost must not be taken for one that sends an empty body. All that reads bodies checks it.
+void check_has_length(const Request& request);
+
 // A request's body in a file: written as it arrives, counted, checked against its Content-Digest.
 // The destructor removes the file. Not thread safe.
 class Upload {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "proto/error.h"
 #include "proto/json.h"
 #include "server/http/limits.h"
 
@@ -63,10 +64,7 @@ class EventSource : public TalkingSource {
 
   More next(std::string& bytes) override {
     if (is_over_ || !stream_.may_listen()) return More::kEnd;
-    if (end_) {
-      tell(*std::exchange(end_, std::nullopt), bytes);
-      return More::kBytes;
-    }
+    if (end_) return tell_end(*std::exchange(end_, std::nullopt), bytes);
     begin(bytes);
     while (auto event = next_event()) {
       if (event->kind == store::EventKind::kDone) {
@@ -86,16 +84,29 @@ class EventSource : public TalkingSource {
     return event;
   }
 
+  // An event may be both in the past and in the mailbox.
   void tell(const store::Event& event, std::string& bytes) {
-    is_over_ = event.kind == store::EventKind::kDone;
-    // An event may be both in the past and in the mailbox. The last event is sent even if the
-    // client claims to have seen a later one.
-    if (event.id <= stream_.last && !is_over_) return;
+    if (event.id > stream_.last) write(event, json_of(event), bytes);
+  }
+
+  // The last event is sent even if the client claims to have seen a later one. Nobody is told about
+  // a job that was deleted meanwhile.
+  More tell_end(const store::Event& event, std::string& bytes) {
+    is_over_ = true;
+    try {
+      write(event, stream_.result(), bytes);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+      return More::kEnd;
+    }
+    return More::kBytes;
+  }
+
+  void write(const store::Event& event, const std::string& data, std::string& bytes) {
     stream_.last = event.id;
     bytes.append("id: ").append(std::to_string(event.id));
     bytes.append("\nevent: ").append(name_of(event.kind));
-    bytes.append("\ndata: ").append(is_over_ ? stream_.result() : json_of(event));
-    bytes.append("\n\n");
+    bytes.append("\ndata: ").append(data).append("\n\n");
   }
 
   EventStream stream_;               // `past` is reversed

@@ -233,16 +233,12 @@ void list_walls(const App& app, const Request& request, Response& response) {
   answer_tagged_json(request, response, to_json(page, next));
 }
 
-// As JSON; null if it is gone.
+// As JSON; null if it is gone or its record is damaged.
 std::string volume_of(const App& app, const Request& request, const Job& job) {
-  try {
-    Volume volume = app.services.volumes.get(viewer_of(request), job.parameters.volume);
-    if (volume.dicom) volume.dicom->instances.clear();
-    return to_json(volume);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
-    return "null";
-  }
+  auto volume = app.services.volumes.find(viewer_of(request), job.parameters.volume);
+  if (!volume) return "null";
+  if (volume->dicom) volume->dicom->instances.clear();
+  return to_json(*volume);
 }
 
 void report(const App& app, const Request& request, Response& response) {

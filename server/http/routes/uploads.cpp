@@ -110,6 +110,7 @@ void look(App& app, const Request& request, Response& response) {
 }
 
 void append(App& app, const Request& request, Response& response) {
+  check_has_length(request);
   if (lower(trimmed(split(request.header("Content-Type"), ';').front())) != kPartType) {
     throw Error(ErrorCode::kUnsupportedMedia,
                 std::string("the body's Content-Type must be ") + kPartType);
@@ -144,13 +145,10 @@ void cancel(App& app, const Request& request, Response& response) {
   const std::string owner = owner_of(request);
   std::vector<Volume> stored;
   for (const std::string& id : app.kept.cancel(owner, request.path_parameter("id"))) {
-    try {
-      stored.push_back(app.services.volumes.get(owner, id));
-      stored.back().dicom.reset();  // as in lists
-    } catch (const Error& error) {
-      // It was deleted since.
-      if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
-    }
+    auto volume = app.services.volumes.find(owner, id);
+    if (!volume) continue;  // it was deleted since
+    volume->dicom.reset();  // as in lists
+    stored.push_back(*std::move(volume));
   }
   response.status = 204;
   if (!stored.empty()) answer_json(response, 200, to_json(stored));

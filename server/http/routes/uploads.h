@@ -14,6 +14,9 @@ struct KeptBody {
   KeptUploads::Kept file;
   std::string name = {};
   KeptUploads::Partial partial = {};  // null unless the upload is resumable
+
+  // True if its sender may read it again with other options.
+  bool is_to_stay() const;
 };
 
 // Answers with the volumes read from the body as the query says. Throws Error kCancelled if the
@@ -31,7 +34,7 @@ void check_told_length(const Request& request, std::optional<std::uint64_t> byte
 // Answers with the URL for the rest. The query must be checked before.
 void begin_upload(App& app, const Request& request, Response& response);
 
-// Deletes kept uploads unless there are `bytes` of free space.
+// Deletes kept uploads if there are no `bytes` of free space, and would be then.
 void make_room_for(App& app, std::uint64_t bytes);
 
 }  // namespace isomesh::http

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 
 #include "proto/json.h"
@@ -18,14 +19,26 @@ constexpr const char* kVolumeCursor = "volumes";
 // The name of a rejected upload that is kept; clients send it as the request's parameter `upload`.
 constexpr const char* kUploadHeader = "Isomesh-Upload";
 
-bool is_to_be_kept(const Request& request) { return flag_of(request, "keep", false); }
+constexpr const char* kKeep = "keep";
+
+bool is_to_be_kept(const Request& request) { return flag_of(request, kKeep, false); }
+
+// A request for a kept upload that has no options has those of the upload's beginning.
+Request with_own_options(const Request& request, const KeptUploads::Partial& upload) {
+  Request asked = request;
+  if (upload && import_parameters_in(request.query).empty()) {
+    for (auto& option : import_parameters_in(upload->note().query)) {
+      asked.query.push_back(std::move(option));
+    }
+  }
+  return asked;
+}
 
 // The request's body, or a kept upload.
-KeptBody body_of(App& app, const Request& request) {
+KeptBody body_of(App& app, const Request& request, const KeptUploads::Partial& partial) {
   if (request.has_parameter("upload")) {
     std::string name(request.parameter("upload"));
-    KeptUploads::Partial partial = app.kept.partial_of(owner_of(request), name);
-    return {app.kept.find(owner_of(request), name), std::move(name), std::move(partial)};
+    return {app.kept.find(owner_of(request), name), std::move(name), partial};
   }
   check_told_length(request, request.content_length);
   make_room_for(app, request.content_length.value_or(0));
@@ -41,6 +54,8 @@ KeptBody body_of(App& app, const Request& request) {
 bool may_be_helped(const Error& error) {
   return error.code() == ErrorCode::kUnsupportedMedia || error.remedy() != Remedy();
 }
+
+bool is_stored(const UploadedVolume& each) { return each.volume.has_value(); }
 
 void keep(App& app, const Request& request, Response& response, const KeptBody& body) {
   response.set_header(kUploadHeader,
@@ -77,23 +92,33 @@ std::vector<UploadedVolume> imported(App& app, const Request& request, Response&
 
 std::set<std::string> upload_parameters() {
   std::set<std::string> names = import_parameters();
-  names.insert({"keep", "upload"});
+  names.insert({kKeep, "upload"});
   return names;
 }
 
-// A client that missed the response to the last part asks by the upload's name.
-bool answer_what_it_became(App& app, const Request& request, Response& response) {
-  if (!request.has_parameter("upload")) return false;
-  if (request.content_length.value_or(1) != 0) {
+// Null for an upload that is not resumable, and without one.
+KeptUploads::Partial partial_of(App& app, const Request& request) {
+  if (!request.has_parameter("upload")) return nullptr;
+  if (request.has_body()) {
     throw invalid_parameter("upload", "names a body that the service already has: send no body");
   }
-  const std::string volume =
-      app.kept.became(owner_of(request), std::string(request.parameter("upload")));
-  if (volume.empty()) return false;
-  const std::string id = volume_from_json(volume).id;
+  return app.kept.partial_of(owner_of(request), std::string(request.parameter("upload")));
+}
+
+// A client that missed the response to the last part asks by the upload's name, with the same
+// options. With others the upload would be another volume.
+bool answer_what_it_became(App& app, const Request& request, Response& response,
+                           const KeptUploads::Partial& upload) {
+  if (!upload) return false;
+  const PartialNote note = upload->note();
+  if (note.volume.empty()) return false;
+  Request first;
+  first.query = note.read_with;
+  if (import_options_of(first) != import_options_of(request)) return false;
+  const std::string id = volume_from_json(note.volume).id;
   if (!app.services.volumes.contains(owner_of(request), id)) return false;  // it was deleted since
   response.set_header("Location", kVolumes + '/' + id);
-  answer_json(response, 200, volume);
+  answer_json(response, 200, note.volume);
   return true;
 }
 
@@ -102,9 +127,11 @@ void upload(App& app, const Request& request, Response& response) {
   import_options_of(request);
   is_to_be_kept(request);
   if (begins_upload(request)) return begin_upload(app, request, response);
-  if (answer_what_it_became(app, request, response)) return;
+  const KeptUploads::Partial partial = partial_of(app, request);
+  const Request asked = with_own_options(request, partial);
+  if (answer_what_it_became(app, asked, response, partial)) return;
   const auto place = place_for_upload(app, request);
-  answer_volumes(app, request, response, body_of(app, request));
+  answer_volumes(app, asked, response, body_of(app, asked, partial));
 }
 
 // True for the form of store::cursor_of: a time, a space and an id.
@@ -199,20 +226,37 @@ void erase(App& app, const Request& request, Response& response) {
 
 }  // namespace
 
+bool KeptBody::is_to_stay() const {
+  if (!partial) return !name.empty();  // it is kept because its sender asked for it
+  Request first;
+  first.query = partial->note().query;
+  return is_to_be_kept(first);
+}
+
 void make_room_for(App& app, std::uint64_t bytes) {
   app.services.folder.check_is_there();
+  if (bytes > app.options.upload.max_bytes) return;  // it will be rejected
   store::Reserve& reserve = app.services.folder.reserve();
-  if (!reserve.has_room() || bytes > reserve.free_bytes()) app.kept.let_all_go();
+  const std::uint64_t free = reserve.free_bytes();
+  // Nobody loses an upload in vain.
+  const bool is_too_much = bytes > free && bytes - free > app.kept.idle_bytes();
+  if (is_too_much || (reserve.has_room() && bytes <= free)) return;
+  app.kept.let_all_go();
 }
 
 void answer_volumes(App& app, const Request& request, Response& response, const KeptBody& body) {
   const std::vector<UploadedVolume> volumes = imported(app, request, response, body);
   const UploadedVolume& only = volumes.front();
   const bool is_one = volumes.size() == 1 && only.volume;
-  // Another volume of the archive may be requested later, and another series.
-  const bool is_one_of_several = request.has_parameter("member") || request.has_parameter("series");
-  if (only.volume && !body.name.empty() && !is_one_of_several) {
-    app.kept.finish(owner_of(request), body.name, is_one ? to_json(*only.volume) : std::string());
+  // Another choice may follow: another series, volume or member, or other options.
+  const Parameters options = import_parameters_in(request.query);
+  const bool stays = !options.empty() && (is_to_be_kept(request) || body.is_to_stay());
+  if (!body.name.empty() && !stays) {
+    if (is_one) {
+      app.kept.finish(owner_of(request), body.name, to_json(*only.volume), options);
+    } else if (!body.partial && std::ranges::all_of(volumes, is_stored)) {
+      app.kept.let_go(owner_of(request), body.name);
+    }
   }
   if (!is_one) {
     constexpr int kMultiStatus = 207;

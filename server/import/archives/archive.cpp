@@ -19,6 +19,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/import/limits.h"
+#include "server/import/source/old_encodings.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import {
@@ -162,9 +163,10 @@ class OpenArchive {
   bool in_member_ = false;
 };
 
-std::string name_of(archive_entry* entry, std::size_t number) {
+// In UTF-8, whatever the archive says: names are shown and chosen by people.
+std::string name_of(archive_entry* entry, std::size_t number, OldEncoding otherwise) {
   for (const char* name : {::archive_entry_pathname_utf8(entry), ::archive_entry_pathname(entry)}) {
-    if (name != nullptr) return name;
+    if (name != nullptr) return as_utf8(name, otherwise);
   }
   return "member " + std::to_string(number);
 }
@@ -225,7 +227,8 @@ class Unpacker {
                                               std::to_string(limits_.max_members) +
                                               " members that are accepted.");
       }
-      const std::string name = name_of(entry, entries_);
+      const std::string name =
+          name_of(entry, entries_, reader_.is_tar() ? OldEncoding::kLatin1 : OldEncoding::kIbm437);
       if (::archive_entry_is_encrypted(entry) != 0) {
         throw_unusable("The archive is encrypted. Send it without a password.");
       }

@@ -34,7 +34,7 @@ struct ArchiveLimits {
 };
 
 struct ArchiveMember {
-  std::string name;            // as in the archive, with folders; never used as a path
+  std::string name;            // in UTF-8, with folders; never used as a path
   std::filesystem::path path;  // of the unpacked file; its file name is the member's, sanitised
   bool is_whole = true;        // otherwise truncated to kBeginningBytes
   std::uint64_t bytes = 0;     // of the whole member; 0 if truncated and unknown

@@ -19,6 +19,7 @@
 #include "server/import/formats/placing.h"
 #include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {
@@ -115,17 +116,8 @@ double number_of(const Hdf5File& file, const std::string& path, const std::strin
   return numbers.empty() ? otherwise : numbers.front();
 }
 
-// The millimetres of an axis's unit. All axes together have at most one note.
-double minc_unit(const Hdf5File& file, const std::string& path, std::vector<Note>& notes) {
-  std::vector<Note> own_notes;
-  Geometry unit;
-  scale_to_millimetres(unit, file.text(path, "units").value_or(""), own_notes);
-  if (notes.empty()) notes = std::move(own_notes);
-  return unit.spacing[0];
-}
-
-Geometry minc_geometry(const Hdf5File& file, std::span<const std::string> axes,
-                       std::vector<Note>& notes) {
+void set_minc_geometry(const Hdf5File& file, std::span<const std::string> axes,
+                       SourceVolume& source) {
   Vector3 origin = {0, 0, 0};
   std::array<Vector3, 3> steps = {};
   for (std::size_t at = 0; at < axes.size(); ++at) {
@@ -137,7 +129,7 @@ Geometry minc_geometry(const Hdf5File& file, std::span<const std::string> axes,
     cosines[axis_row(axes[at]).value()] = 1;
     const auto told = file.numbers(path, "direction_cosines");
     if (told.size() == 3) std::ranges::copy(told, cosines.begin());
-    const double unit = minc_unit(file, path, notes);
+    const double unit = take_unit(file.text(path, "units").value_or(""), source);
     const double start = number_of(file, path, "start", 0) * unit;
     const double step = number_of(file, path, "step", 1) * unit;
     for (std::size_t row = 0; row < 3; ++row) {
@@ -145,7 +137,7 @@ Geometry minc_geometry(const Hdf5File& file, std::span<const std::string> axes,
       steps[axes.size() - 1 - at][row] = step * cosines[row];
     }
   }
-  return geometry_of_ras(origin, steps);
+  source.geometry = geometry_of_ras(origin, steps);
 }
 
 // The last three axes must be spatial and different; a time may precede them.
@@ -253,7 +245,7 @@ Volume read_minc(const Hdf5File& file, const Input& input) {
   const std::vector<std::string> axes = spatial_axes(file, array);
   SourceVolume source;
   const Planes planes = choose_planes(array, input, source);
-  source.geometry = minc_geometry(file, axes, source.notes);
+  set_minc_geometry(file, axes, source);
   ScratchFile samples(input.task.scratch, ".samples");
   const bool is_real = array.type() == StoredType::kFloat32 || array.type() == StoredType::kFloat64;
   const auto scale = is_real ? std::nullopt : std::optional(scale_of(file, array));

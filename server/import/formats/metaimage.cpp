@@ -14,6 +14,7 @@
 #include "server/import/source/line_reader.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/source.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {
@@ -358,7 +359,7 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   volume.geometry = geometry_of_fields(fields, sizes.size());
   volume.assumes_spacing =
       value_of(fields, "ElementSpacing").empty() && value_of(fields, "ElementSize").empty();
-  scale_to_millimetres(volume.geometry, value_of(fields, "DistanceUnits"), volume.notes);
+  scale_to_millimetres(value_of(fields, "DistanceUnits"), volume);
   return volume;
 }
 

@@ -156,8 +156,8 @@ void choose_mif_volume(const std::vector<std::uint64_t>& sizes, const std::vecto
   if (axes[axis].is_reversed) volume.chosen.index = count - 1 - volume.chosen.index;
 }
 
-// Coordinates are RAS; a reversed axis begins at its other end. MRtrix takes the axes for those of
-// RAS if there is no transform.
+// Coordinates are RAS; a reversed axis begins at its other end. If there is no transform, MRtrix
+// takes the axes for those of RAS, and centres the image.
 Geometry mif_geometry(const MifHeader& header, const std::vector<StoredAxis>& axes,
                       SourceVolume& volume) {
   std::array<Vector3, 3> steps = {Vector3{1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, 0, 1}};
@@ -175,8 +175,7 @@ Geometry mif_geometry(const MifHeader& header, const std::vector<StoredAxis>& ax
   if (lines == 0) {
     volume.notes.push_back(note_of(NoteCode::kSpaceAssumed,
                                    "The MIF file has no transform. Its axes x, y and z were read "
-                                   "as those of RAS, as in MRtrix. The voxel (0,0,0) is at the "
-                                   "origin."));
+                                   "as those of RAS, with (0,0,0) in the middle, as in MRtrix."));
   }
   const std::vector<std::string_view> sizes = parts_of(required(header.fields, kMifTitle, "vox"));
   if (sizes.size() < 3) throw_unusable("The MIF header's vox is damaged.");
@@ -185,6 +184,7 @@ Geometry mif_geometry(const MifHeader& header, const std::vector<StoredAxis>& ax
     if (!size) throw_unusable("The MIF header's vox is damaged.");
     for (std::size_t row = 0; row < 3; ++row) {
       steps[axis][row] *= *size;
+      if (lines == 0) origin[row] -= steps[axis][row] * (volume.dims[axis] - 1) / 2;
       if (!axes[axis].is_reversed) continue;
       origin[row] += steps[axis][row] * (volume.dims[axis] - 1);
       steps[axis][row] = -steps[axis][row];

@@ -15,6 +15,7 @@
 #include "server/import/formats/nrrd_space.h"
 #include "server/import/source/line_reader.h"
 #include "server/import/source/reader.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {
@@ -290,6 +291,7 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
     volume.payload = range_from(file, payload_offset(file, header, volume));
   }
   volume.geometry = nrrd_geometry(fields, sizes.all, options, volume.notes);
+  scale_to_millimetres(nrrd_unit(fields, sizes.all), volume);
   volume.assumes_spacing = !nrrd_has_spacing(fields, sizes.all);
   return volume;
 }

@@ -481,8 +481,11 @@ Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t
   } else {
     note_space(fields, notes);
   }
-  scale_to_millimetres(geometry, unit_of(fields, kinds), notes);
   return geometry;
+}
+
+std::string nrrd_unit(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes) {
+  return unit_of(fields, kinds_of(fields, sizes.size()));
 }
 
 bool nrrd_has_spacing(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes) {

@@ -35,10 +35,10 @@ struct NrrdSizes {
 // colours, and for several such axes.
 NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes);
 
-// The geometry of the lattice's first three axes, in LPS millimetres. Converts RAS and LAS to LPS.
-// Other right-handed spaces and unnamed ones are used unchanged, with a note, because their
-// relation to the patient is unknown; a left-handed one must be accepted by the options and is
-// noted. An unnamed space of four dimensions is ITK's, LPS, or that of a segmentation of an old
+// The geometry of the lattice's first three axes, in LPS, in the header's unit. Converts RAS and
+// LAS to LPS. Other right-handed spaces and unnamed ones are used unchanged, with a note, because
+// their relation to the patient is unknown; a left-handed one must be accepted by the options and
+// is noted. An unnamed space of four dimensions is ITK's, LPS, or that of a segmentation of an old
 // Slicer version: RAS, with the samples' position in Segment0_Extent. A note tells which; the
 // options must accept it if the header does not tell. An axis without a spacing or a direction gets
 // it from its min and max, otherwise 1 mm. Without an origin the first sample is at (0,0,0). Both
@@ -46,6 +46,10 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
 // other or the format.
 Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
                        const ImportOptions& options, std::vector<Note>& notes);
+
+// The unit of the geometry; empty if the header has none. Throws Error kUnusableVolume if the axes
+// have different ones.
+std::string nrrd_unit(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes);
 
 // False if no axis of the lattice has a spacing, a direction, or a min and a max.
 bool nrrd_has_spacing(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes);

@@ -326,7 +326,7 @@ Volume parse_zarr(const Input& input) {
   std::vector<std::uint64_t> place(array.shape.size());
   beyond.set(source.chosen.index, place);
   source.chosen = {};
-  set_zarr_geometry(scales, axes, spatial, input.task.options, source);
+  set_zarr_geometry(scales, axes, spatial, source);
   set_zarr_labels(group, source);
   const Counts counts = chunk_counts(array, spatial, input.task.limits);
   ScratchFile scratch(input.task.scratch, ".zarr");

@@ -1,5 +1,6 @@
 #include "server/import/formats/zarr_meaning.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -11,6 +12,7 @@
 #include "base/text.h"
 #include "server/import/formats/placing.h"
 #include "server/import/labels/label_table.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {
@@ -50,42 +52,29 @@ void apply(const Json& transformations, Line& line) {
   }
 }
 
-// The millimetres of one step in each axis' unit. Without units, or with others than lengths, the
-// spacing is assumed.
+// The millimetres of one step in each axis' unit.
 std::vector<double> millimetres_of(const std::vector<ZarrAxis>& axes,
                                    const std::array<std::size_t, 3>& spatial,
-                                   const ImportOptions& options, SourceVolume& source) {
-  std::map<std::string, double> millimetres;
+                                   SourceVolume& source) {
   std::vector<double> factors;
-  std::vector<Note> notes;
-  for (const std::size_t axis : spatial) {
-    const std::string& unit = axes[axis].unit;
-    if (!millimetres.contains(unit)) {
-      Geometry one;
-      scale_to_millimetres(one, unit, notes);
-      millimetres[unit] = one.spacing[0];
-    }
-    factors.push_back(millimetres[unit]);
+  for (const std::size_t axis : spatial) factors.push_back(take_unit(axes[axis].unit, source));
+  const bool is_missing =
+      std::ranges::any_of(spatial, [&](std::size_t axis) { return is_no_unit(axes[axis].unit); });
+  if (is_missing && !source.unknown_unit) {
+    source.unknown_unit = {.why = "The OME-Zarr does not say the unit of its axes.",
+                           .is_assumed = true};
   }
-  if (millimetres.contains("")) {
-    notes.push_back(note_of(
-        NoteCode::kUnitUnknown,
-        "The OME-Zarr does not say the unit of its axes. One unit was read as one millimetre. "
-        "spacing=X,Y,Z gives the distances between samples in mm."));
-  }
-  source.assumes_spacing |= !notes.empty();
-  if (!options.spacing && !notes.empty()) source.notes.push_back(notes.front());
   return factors;
 }
 
 // The direction in which an axis grows, in LPS. Empty if the file does not say it.
 std::optional<Vector3> direction_of(const std::string& orientation) {
-  static const std::map<std::string, Vector3, std::less<>> kDirections = {
+  static const std::map<std::string, Vector3, std::less<>> directions = {
       {"right-to-left", {1, 0, 0}},         {"left-to-right", {-1, 0, 0}},
       {"anterior-to-posterior", {0, 1, 0}}, {"posterior-to-anterior", {0, -1, 0}},
       {"inferior-to-superior", {0, 0, 1}},  {"superior-to-inferior", {0, 0, -1}}};
-  const auto found = kDirections.find(orientation);
-  return found == kDirections.end() ? std::nullopt : std::optional(found->second);
+  const auto found = directions.find(orientation);
+  return found == directions.end() ? std::nullopt : std::optional(found->second);
 }
 
 // The directions of x, y and z, with a note if the file does not say all of them.
@@ -178,13 +167,12 @@ std::array<std::size_t, 3> zarr_spatial_axes(const std::vector<ZarrAxis>& axes) 
 }
 
 void set_zarr_geometry(const Json& scales, const std::vector<ZarrAxis>& axes,
-                       const std::array<std::size_t, 3>& spatial, const ImportOptions& options,
-                       SourceVolume& source) {
+                       const std::array<std::size_t, 3>& spatial, SourceVolume& source) {
   Line line = {std::vector<double>(axes.size(), 1), std::vector<double>(axes.size(), 0)};
   apply(zarr_member(zarr_member(scales, "datasets")[0], "coordinateTransformations"), line);
   apply(zarr_member(scales, "coordinateTransformations"), line);
   const std::array<Vector3, 3> directions = directions_of(axes, spatial, source.notes);
-  const std::vector<double> units = millimetres_of(axes, spatial, options, source);
+  const std::vector<double> units = millimetres_of(axes, spatial, source);
   source.assumes_spacing |= !line.has_scale;
   Geometry& geometry = source.geometry;
   geometry.origin = {0, 0, 0};

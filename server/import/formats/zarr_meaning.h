@@ -30,8 +30,7 @@ std::array<std::size_t, 3> zarr_spatial_axes(const std::vector<ZarrAxis>& axes);
 
 // By the first dataset of a multiscale. Throws Error kUnusableVolume.
 void set_zarr_geometry(const Json& scales, const std::vector<ZarrAxis>& axes,
-                       const std::array<std::size_t, 3>& spatial, const ImportOptions& options,
-                       SourceVolume& source);
+                       const std::array<std::size_t, 3>& spatial, SourceVolume& source);
 
 // Names and colours of `image-label`; its values are labels even without them. Throws Error
 // kUnusableVolume.

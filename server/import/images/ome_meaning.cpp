@@ -13,6 +13,7 @@
 #include "base/xml_reader.h"
 #include "server/import/images/tiff_meaning.h"
 #include "server/import/source/names.h"
+#include "server/import/source/old_encodings.h"
 
 namespace isomesh::import {
 namespace {
@@ -132,19 +133,7 @@ std::string cleaned(std::string_view text) {
 }
 
 // Some programs write Latin-1 and call it UTF-8.
-std::string from_latin_1(std::string_view text) {
-  std::string result;
-  for (const char letter : text) {
-    const auto code = static_cast<unsigned char>(letter);
-    if (code < 0x80) {
-      result += letter;
-    } else {
-      result += static_cast<char>(0xC0U | (code >> 6U));
-      result += static_cast<char>(0x80U | (code & 0x3FU));
-    }
-  }
-  return result;
-}
+std::string from_latin_1(std::string_view text) { return as_utf8(text, OldEncoding::kLatin1); }
 
 OmeDocument ome_document(std::string text) {
   for (const auto repair : {&cleaned, &from_latin_1}) {

@@ -20,10 +20,11 @@ std::size_t indices_of(StoredType type) {
 
 bool is_grey(const Colour& colour) { return colour[0] == colour[1] && colour[0] == colour[2]; }
 
-std::string text_of(const Colour& colour) {
+std::string text_of(const std::optional<Colour>& colour) {
   constexpr std::string_view kDigits = "0123456789abcdef";
+  if (!colour) return "beyond the palette";
   std::string text = "#";
-  for (const std::uint8_t part : colour) {
+  for (const std::uint8_t part : *colour) {
     text += kDigits[part / 16];
     text += kDigits[part % 16];
   }
@@ -65,8 +66,10 @@ void Palettes::begin(const PageLayout& layout) {
 void Palettes::use(std::span<const std::byte> samples) {
   Run& run = runs_.back();
   if (run.palette.empty()) return;
-  for_each_index(samples, run.type,
-                 [&](auto index, const std::byte* /*place*/) { run.used[index] = true; });
+  for_each_index(samples, run.type, [&](auto index, const std::byte* /*place*/) {
+    run.used[index] = true;
+    beyond_ += index < run.palette.size() ? 0 : 1;
+  });
 }
 
 bool Palettes::are_grey() const {
@@ -77,7 +80,7 @@ bool Palettes::are_grey() const {
 bool Palettes::replaces() const {
   return are_grey() && std::ranges::any_of(runs_, [](const Run& run) {
            for (std::size_t index = 0; index < run.used.size(); ++index) {
-             if (run.used[index] && run.colour(index)[0] != index) return true;
+             if (run.used[index] && run.grey(index) != index) return true;
            }
            return false;
          });
@@ -88,14 +91,14 @@ void Palettes::replace(std::uint64_t page, std::span<std::byte> samples) const {
   const Run& run = *(behind - 1);
   if (run.palette.empty()) return;
   for_each_index(samples, run.type, [&](auto index, std::byte* place) {
-    index = run.colour(index)[0];
+    index = run.grey(index);
     std::memcpy(place, &index, sizeof(index));
   });
 }
 
 std::vector<LabelEntry> Palettes::labels() const {
   if (are_grey()) return {};
-  std::map<std::size_t, Colour> colours;
+  std::map<std::size_t, std::optional<Colour>> colours;
   for (const Run& run : runs_) {
     if (run.palette.empty()) {
       throw_unusable(
@@ -104,7 +107,7 @@ std::vector<LabelEntry> Palettes::labels() const {
     }
     for (std::size_t index = 0; index < run.used.size(); ++index) {
       if (!run.used[index]) continue;
-      const Colour colour = run.colour(index);
+      const std::optional<Colour> colour = run.colour(index);
       const auto [found, is_new] = colours.try_emplace(index, colour);
       if (is_new || found->second == colour) continue;
       throw_unusable("The pages have different palettes: index " + std::to_string(index) + " is " +
@@ -115,10 +118,22 @@ std::vector<LabelEntry> Palettes::labels() const {
   }
   std::vector<LabelEntry> labels;
   for (const auto& [index, colour] : colours) {
-    if (index != 0)
-      labels.push_back({.label = static_cast<std::int64_t>(index), .color = text_of(colour)});
+    if (index == 0) continue;
+    LabelEntry& entry = labels.emplace_back();
+    entry.label = static_cast<std::int64_t>(index);
+    if (colour) entry.color = text_of(colour);
   }
   return labels;
+}
+
+std::optional<Note> Palettes::note() const {
+  if (beyond_ == 0) return std::nullopt;
+  return note_of(
+      NoteCode::kHeaderCorrected,
+      std::to_string(beyond_) + (beyond_ == 1 ? " sample has an index" : " samples have an index") +
+          " beyond the colours of the picture's palette. " +
+          (are_grey() ? "They were read as 0, which is black. Some programs show other greys."
+                      : "Such an index is a label without a colour."));
 }
 
 }  // namespace isomesh::import

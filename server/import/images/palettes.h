@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,10 @@ class Palettes {
   // are indexed: their indices would not be the same labels.
   std::vector<LabelEntry> labels() const;
 
+  // On samples whose index is beyond their palette; empty if there are none. They are black in grey
+  // pictures, and otherwise labels without a colour.
+  std::optional<Note> note() const;
+
  private:
   // Consecutive pages with one palette, which is empty for grey pages.
   struct Run {
@@ -37,9 +42,11 @@ class Palettes {
     std::vector<bool> used = {};
     StoredType type = StoredType::kUint8;
 
-    Colour colour(std::size_t index) const {
-      return index < palette.size() ? palette[index] : Colour{0, 0, 0};
+    // Empty beyond the palette.
+    std::optional<Colour> colour(std::size_t index) const {
+      return index < palette.size() ? std::optional(palette[index]) : std::nullopt;
     }
+    std::uint8_t grey(std::size_t index) const { return colour(index).value_or(Colour{})[0]; }
   };
 
   bool are_grey() const;
@@ -47,6 +54,7 @@ class Palettes {
   std::vector<Run> runs_;
   std::uint64_t pages_ = 0;
   std::uint64_t indices_ = 0;  // of all palettes, used or not
+  std::uint64_t beyond_ = 0;   // samples
 };
 
 }  // namespace isomesh::import

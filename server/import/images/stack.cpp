@@ -43,6 +43,7 @@ class Pages {
     // A calibration makes other values of the indices.
     if (!source.layout.rescale) source.labels = palettes_.labels();
     source.labels_if_flat = true;
+    if (auto note = palettes_.note()) source.notes.push_back(*std::move(note));
     if (!palettes_.replaces()) return write_canonical(InputFile(samples_.path()), source, task_);
     ScratchFile greys(task_.scratch, ".greys");
     write_greys(greys);

@@ -8,13 +8,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/error.h"
 #include "base/text.h"
-#include "proto/error.h"
 #include "proto/json_text.h"
 #include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
-#include "server/import/source/source.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {
@@ -323,16 +321,10 @@ void check_pages(const TiffMeaning& meaning, std::uint64_t pages) {
 }
 
 std::optional<double> described_length(std::string_view unit) {
-  Geometry geometry;
-  std::vector<Note> notes;
-  try {
-    scale_to_millimetres(geometry, unit == "\\u00B5m" ? "um" : unit, notes);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kUnusableVolume) throw;
-    return std::nullopt;
-  }
-  if (!notes.empty()) return std::nullopt;
-  return geometry.spacing[0];
+  // As ImageJ escapes letters beyond ASCII.
+  if (unit == "\\u00B5m") return millimetres_of("um");
+  if (unit == "\\u00C5") return millimetres_of("angstrom");
+  return millimetres_of(unit);
 }
 
 std::optional<double> described_positive(std::string_view text) {

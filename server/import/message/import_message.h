@@ -25,6 +25,8 @@ struct PeersSeries {
   std::string study;         // UIDs
   std::string series;
   std::vector<std::string> instances;  // all of them, ascending, unique
+
+  bool operator==(const PeersSeries&) const = default;
 };
 
 struct ImportOptions {
@@ -46,6 +48,8 @@ struct ImportOptions {
   bool accepts(NoteCode code) const {
     return std::ranges::find(accept, describe(code).name) != accept.end();
   }
+
+  bool operator==(const ImportOptions&) const = default;
 };
 
 // All DICOM files of an archive; not a valid member name.

@@ -24,34 +24,96 @@
 namespace isomesh::import {
 namespace {
 
+constexpr const char* kNoSpacing = "The file does not say how far apart its samples are.";
+
+// `example` is one that the request may give.
+[[noreturn]] void throw_no_spacing(const std::string& why, const Vector3& example) {
+  const auto& [x, y, z] = example;
+  const bool is_one = x == y && x == z;
+  throw_choice(why + " Give the distances along x, y and z in millimetres: spacing=X,Y,Z.",
+               {{"spacing", to_text(x) + ',' + to_text(y) + ',' + to_text(z),
+                 (is_one ? to_text(x) : to_text(x) + ", " + to_text(y) + " and " + to_text(z)) +
+                     " mm along x, y and z"}});
+}
+
+// Why the request may replace the file's own spacing; empty if it may not.
+std::string fault_of_spacing(const SourceVolume& source, const Geometry& geometry) {
+  if (source.unknown_unit) return source.unknown_unit->why;
+  const auto fault = find_fault(source.dims, geometry);
+  const bool is_length = std::ranges::all_of(
+      geometry.spacing, [](double size) { return std::isfinite(size) && size > 0; });
+  // A unit that is far too small or too large.
+  if (!fault || fault->field != "spacing" || !is_length) return {};
+  return "The file's geometry cannot be used: " + fault->message + '.';
+}
+
+// Gives the lattice another spacing. Its first sample stays as many steps from the origin of space,
+// because the unit of its place is that of the spacing.
+void change_unit(const Vector3& spacing, Geometry& geometry) {
+  Vector3 rest = geometry.origin;  // without its parts along the axes; 0 if they are perpendicular
+  Vector3 origin = {0, 0, 0};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double factor = spacing[axis] / geometry.spacing[axis];
+    double along = 0;
+    for (std::size_t row = 0; row < 3; ++row) {
+      along += geometry.direction[row * 3 + axis] * geometry.origin[row];
+    }
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double part = geometry.direction[row * 3 + axis] * along;
+      origin[row] += part * factor;
+      rest[row] -= part;
+    }
+  }
+  const double factor = spacing[0] / geometry.spacing[0];
+  for (std::size_t row = 0; row < 3; ++row) origin[row] += rest[row] * factor;
+  geometry.origin = origin;
+  geometry.spacing = spacing;
+}
+
+// The spacing in proportion, for an example.
+Vector3 proportions(const Vector3& spacing) {
+  Vector3 result = spacing;
+  for (double& size : result) size /= std::ranges::min(spacing);
+  return result;
+}
+
 // The geometry of a file that has a spacing, or of the request's.
 Geometry spaced_geometry(const SourceVolume& source, const ImportOptions& options) {
-  if (source.has_spacing && !source.assumes_spacing) refuse_spacing(options);
-  if (source.has_spacing && !options.spacing) return source.geometry;
-  if (!options.spacing) {
-    throw_choice(
-        "The file does not say how far apart its samples are. Give the distances along x, y and z "
-        "in millimetres: spacing=X,Y,Z.",
-        {{"spacing", "1,1,1", "1 mm along x, y and z"}});
-  }
   Geometry geometry = normalised(source.geometry);
-  geometry.spacing = *options.spacing;
+  const std::string fault = fault_of_spacing(source, geometry);
+  const bool is_told = source.has_spacing && !source.assumes_spacing;
+  if (is_told && fault.empty()) refuse_spacing(options);
+  if (options.spacing && fault.empty()) {
+    geometry.spacing = *options.spacing;
+  } else if (options.spacing) {
+    change_unit(*options.spacing, geometry);
+  } else if (!source.has_spacing) {
+    throw_no_spacing(kNoSpacing, {1, 1, 1});
+  } else if (!fault.empty() && !(source.unknown_unit && source.unknown_unit->is_assumed)) {
+    throw_no_spacing(fault, source.unknown_unit ? geometry.spacing : proportions(geometry.spacing));
+  }
   return geometry;
 }
 
 void note_assumed_spacing(const SourceVolume& source, const ImportOptions& options,
                           Volume& volume) {
   const std::string_view code = describe(NoteCode::kUnitUnknown).name;
-  if (!source.assumes_spacing || options.spacing ||
-      std::ranges::find(volume.notes, code, &Note::code) != volume.notes.end()) {
+  if (options.spacing || std::ranges::find(volume.notes, code, &Note::code) != volume.notes.end()) {
     return;
   }
   const Vector3& spacing = volume.geometry.spacing;
-  volume.notes.push_back(
-      note_of(NoteCode::kUnitUnknown,
-              "The file does not say how far apart its samples are. " + to_text(spacing[0]) + ", " +
-                  to_text(spacing[1]) + " and " + to_text(spacing[2]) +
-                  " mm along x, y and z were assumed. spacing=X,Y,Z gives other distances in mm."));
+  if (source.unknown_unit) {
+    volume.notes.push_back(note_of(
+        NoteCode::kUnitUnknown, source.unknown_unit->why +
+                                    " One unit was read as one millimetre. spacing=X,Y,Z gives the "
+                                    "distances between samples in mm."));
+  } else if (source.assumes_spacing) {
+    volume.notes.push_back(note_of(
+        NoteCode::kUnitUnknown,
+        std::string(kNoSpacing) + ' ' + to_text(spacing[0]) + ", " + to_text(spacing[1]) + " and " +
+            to_text(spacing[2]) +
+            " mm along x, y and z were assumed. spacing=X,Y,Z gives other distances in mm."));
+  }
 }
 
 Geometry usable_geometry(const SourceVolume& source, const ImportOptions& options) {

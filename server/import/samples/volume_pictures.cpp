@@ -13,7 +13,7 @@
 namespace isomesh::import {
 namespace {
 
-constexpr double kMostPixels = double{1 << 20};  // of all pictures of an error
+constexpr double kMostPixelsOfAll = double{1 << 20};  // of all pictures of an error
 
 // The first or second axis of a slice runs against the direction in which pictures of patients are
 // drawn: to the left of the patient, to the back, and to the feet.
@@ -81,7 +81,7 @@ Error with_pictures(const Error& error, const InputFile& file, const SourceVolum
                         source.stored_axes == kXFastest;
   const VolumeOfFile& volumes = source.chosen;
   if (!is_plain || volumes.run != 0 || volumes.count < remedy.choices.size()) return error;
-  const double room = std::sqrt(kMostPixels / static_cast<double>(remedy.choices.size()));
+  const double room = std::sqrt(kMostPixelsOfAll / static_cast<double>(remedy.choices.size()));
   try {
     const Payload payload(file, source, scratch);
     const MiddleSlices slices(payload, source,

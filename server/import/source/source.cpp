@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/import/source/line_reader.h"
+#include "server/import/source/old_encodings.h"
 
 namespace isomesh::import {
 namespace {
@@ -17,35 +18,6 @@ namespace {
                                    std::uint64_t expected) {
   throw_unusable("The data file " + in_quotes(name) + " has " + std::to_string(found) +
                  " bytes, but the header declares " + std::to_string(expected) + ".");
-}
-
-bool counts_samples(std::string_view unit) {
-  static constexpr std::string_view kNames[] = {"pixel", "pixels", "voxel", "voxels", "px"};
-  return std::ranges::find(kNames, lower(trimmed(unit))) != std::end(kNames);
-}
-
-double millimetres_per(std::string_view unit) {
-  struct Row {
-    double millimetres;
-    std::vector<std::string_view> names;
-  };
-  static const std::vector<Row> units = {
-      {1, {"", "?", "???", "mm", "millimeter", "millimeters", "millimetre", "millimetres"}},
-      {0.0000001, {"angstrom", "angstroms", "\xc3\x85", "\xe2\x84\xab"}},
-      {0.000001, {"nm", "nanometer", "nanometers", "nanometre", "nanometres"}},
-      {0.001,
-       {"um", "\xc2\xb5m", "\xce\xbcm", "\xb5m", "micron", "microns", "micrometer", "micrometers",
-        "micrometre", "micrometres"}},
-      {10, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"}},
-      {25.4, {"in", "inch", "inches"}},
-      {1000, {"m", "meter", "meters", "metre", "metres"}}};
-  const std::string name = lower(trimmed(unit));
-  for (const Row& row : units) {
-    if (std::find(row.names.begin(), row.names.end(), name) != row.names.end()) {
-      return row.millimetres;
-    }
-  }
-  throw_unusable("The header's unit of length " + in_quotes(unit) + " is unknown.");
 }
 
 }  // namespace
@@ -150,7 +122,9 @@ std::set<std::string> Companions::below(const std::string& folder) const {
 
 const std::filesystem::path& companion(const std::string& name, const Companions& companions) {
   const std::string reason = "The header names the data file " + in_quotes(name);
-  const std::string path = std::filesystem::path(name).lexically_normal().generic_string();
+  const std::string path = std::filesystem::path(as_utf8(name, OldEncoding::kLatin1))
+                               .lexically_normal()
+                               .generic_string();
   if (path.starts_with('/') || path.starts_with("..") || name.find('\\') != std::string::npos) {
     throw_unusable(reason +
                    ", which is outside the header's folder. Only files in that folder and its "
@@ -323,19 +297,6 @@ std::uint64_t volumes_of_frames(std::uint64_t count, const std::string& axis,
 std::string begin_remedy(const ImportOptions& options, const std::string& verb) {
   if (!options.peers) return ' ' + verb + ' ';
   return " An order has no parameter for this. Download the series, and upload it with ";
-}
-
-void scale_to_millimetres(Geometry& geometry, std::string_view unit, std::vector<Note>& notes) {
-  if (counts_samples(unit)) {
-    notes.push_back(note_of(NoteCode::kUnitUnknown,
-                            "The file's unit, " + in_quotes(unit) +
-                                ", is not a length. One unit was read as one millimetre."));
-    return;
-  }
-  const double millimetres = millimetres_per(unit);
-  if (millimetres == 1) return;
-  for (double& value : geometry.origin) value *= millimetres;
-  for (double& value : geometry.spacing) value *= millimetres;
 }
 
 }  // namespace isomesh::import

@@ -126,6 +126,12 @@ struct SegmentLayers {
   std::map<std::pair<std::uint64_t, std::int64_t>, std::uint32_t> labels;
 };
 
+// The unit of a geometry that is no known length.
+struct UnknownUnit {
+  std::string why;          // a sentence
+  bool is_assumed = false;  // one unit is read as one millimetre; otherwise the request must help
+};
+
 // The axes of a lattice as they are stored, the fastest first: 0 is x, 1 is y, 2 is z.
 using StoredAxes = std::array<std::size_t, 3>;
 inline constexpr StoredAxes kXFastest = {0, 1, 2};
@@ -148,6 +154,8 @@ struct SourceVolume {
   // The file gives no spacing, and `geometry` has the default of its format. The request may give
   // another one.
   bool assumes_spacing = false;
+  // Then the request may give the spacing, and the origin stays as many samples away.
+  std::optional<UnknownUnit> unknown_unit = {};
   Geometry geometry;
   std::vector<Note> notes;
   std::vector<LabelEntry> labels;  // see label_table()
@@ -239,10 +247,5 @@ std::uint64_t volumes_of_frames(std::uint64_t count, const std::string& axis,
 // that resolves it: `verb`, such as "Add". An order has no such parameter, so its series must be
 // uploaded.
 std::string begin_remedy(const ImportOptions& options, const std::string& verb);
-
-// Scales origin and spacing from a header's unit ("mm", "um", "cm", "m", ... or full names) to
-// millimetres. A missing unit is millimetres; so is, with a note, one that counts samples
-// ("pixel"). Throws Error kUnusableVolume for unknown units.
-void scale_to_millimetres(Geometry& geometry, std::string_view unit, std::vector<Note>& notes);
 
 }  // namespace isomesh::import

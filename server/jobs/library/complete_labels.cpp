@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "server/jobs/library/label_samples.h"
 #include "server/mesh/labels/label_voxels.h"
 #include "server/volume/names.h"
 
@@ -21,12 +22,11 @@ JobParameters complete_labels(JobParameters parameters, const store::Viewer& vie
                               const Volume& volume, LabelLists& lists) {
   check_has_cells(volume);
   check_background(volume, parameters.background);
-  for (const auto& [label, values] : values_of(volume)) {
-    parameters.label_values.try_emplace(label, values);
-  }
   for (auto& [label, name] : parameters.label_names) name = volume::normalized(name);
   const auto counts = lists.counts(viewer, volume);
-  const auto chosen = mesh::chosen_labels(*counts, parameters);
+  MeshParameters of_samples = parameters;
+  of_samples.label_values = label_samples(parameters.label_values, volume);
+  const auto chosen = mesh::chosen_labels(*counts, of_samples);
   std::vector<std::int64_t> labels;
   std::ranges::transform(chosen, std::back_inserter(labels), &mesh::LabelVoxels::label);
   for (const LabelEntry& entry : volume.labels) {
@@ -35,8 +35,8 @@ JobParameters complete_labels(JobParameters parameters, const store::Viewer& vie
   }
   keep_chosen(labels, parameters.label_names);
   keep_chosen(labels, parameters.label_colors);
-  // With all labels, a value assigned to one label is no label of its own. With chosen labels, only
-  // their own values matter.
+  // With all labels, a label that another one joins is no label of its own. With chosen labels,
+  // only their own lists matter.
   if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
   limit_displacement(volume, parameters);
   return parameters;

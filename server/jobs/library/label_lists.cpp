@@ -8,6 +8,7 @@
 
 #include "proto/samples.h"
 #include "server/jobs/library/intact_volume.h"
+#include "server/jobs/library/label_samples.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
@@ -189,14 +190,6 @@ VolumeLabels list_of(const std::vector<LabelVoxels>& counts, const Volume& volum
 
 }  // namespace
 
-LabelValues values_of(const Volume& volume) {
-  LabelValues values;
-  for (const LabelEntry& entry : volume.labels) {
-    if (!entry.values.empty()) values[entry.label] = entry.values;
-  }
-  return values;
-}
-
 std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::Viewer& viewer,
                                                                    const Volume& volume) {
   return counts_.get({viewer, volume.id}, [&] {
@@ -204,16 +197,6 @@ std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::
     return make_from_volume(blobs_, volume.samples, {},
                             [&] { return count_labels(volume::CanonicalFile(file.path), volume); });
   });
-}
-
-void check_background(const Volume& volume, std::int64_t background) {
-  const std::string_view code = describe(NoteCode::kLabelsRenumbered).name;
-  if (background == 0 || std::ranges::find(volume.notes, code, &Note::code) == volume.notes.end()) {
-    return;
-  }
-  throw invalid_parameter(
-      "background",
-      "must be 0, because the labels of this volume have 64 bits: its samples have other numbers");
 }
 
 VolumeLabels LabelLists::of(const store::Viewer& viewer, const Volume& volume,

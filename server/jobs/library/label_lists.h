@@ -18,13 +18,6 @@
 
 namespace isomesh::jobs {
 
-// Labels of the volume that stand for other values than their own number.
-LabelValues values_of(const Volume& volume);
-
-// Throws Error kInvalidParameter for a background other than 0 of a volume whose labels were
-// renumbered: it would be neither a label nor a sample that anybody knows.
-void check_background(const Volume& volume, std::int64_t background);
-
 // Lists the labels in stored volumes. The first list of a volume reads all samples. The results of
 // the last volumes are cached for each viewer, for the reason given at Histograms. Thread
 // safe; `blobs` must outlive it.

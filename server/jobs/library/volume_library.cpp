@@ -32,7 +32,7 @@ std::string id_of(Volume volume, const std::string& key) {
   volume.name.reset();
   volume.format.clear();
   volume.ignored.clear();
-  const std::string said = to_record(volume);
+  const std::string said = to_full_json(volume);
   return volume.dicom ? to_hex(hmac_sha256(key, said)) : sha256_of(said);
 }
 

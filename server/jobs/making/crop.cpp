@@ -82,6 +82,16 @@ CroppedSamples::CroppedSamples(const SampleArray& samples, const MeshParameters&
   if (parameters.labels && !is_integer(samples.type)) round();
 }
 
+std::uint64_t CroppedSamples::most_bytes(const MeshParameters& parameters, const Geometry& geometry,
+                                         const std::array<std::uint32_t, 3>& dims,
+                                         SampleType type) {
+  SampleRange range = {.begin = {0, 0, 0}, .end = dims};
+  if (parameters.crop) range = samples_in(*parameters.crop, geometry, dims);
+  const bool is_rounded = parameters.labels && !is_integer(type);
+  return range.count() *
+         ((parameters.crop ? bytes_per_sample(type) : 0) + (is_rounded ? sizeof(std::int32_t) : 0));
+}
+
 void CroppedSamples::crop(const SampleArray& samples, const SampleRange& range) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     array_.dims[axis] = range.end[axis] - range.begin[axis];
@@ -114,7 +124,7 @@ void CroppedSamples::round() {
       is_rounded_ = volume::round_labels(std::span(first, count), rounded_.data());
     }
   });
-  copy_.resize_for_overwrite(0);
+  copy_ = {};  // a buffer that shrinks keeps its memory
   array_.type = SampleType::kInt32;
   array_.bytes = reinterpret_cast<const std::byte*>(rounded_.data());
 }

@@ -39,8 +39,11 @@ class CroppedSamples {
   // True if a sample was no whole number.
   bool is_rounded() const { return is_rounded_; }
 
-  // The memory of floats that became integers.
-  std::uint64_t rounded_bytes() const { return rounded_.size() * sizeof(std::int32_t); }
+  // The memory of the copies that it holds, and that of those which it takes meanwhile, for samples
+  // of that type. The latter throws as samples_in.
+  std::uint64_t bytes() const { return copy_.size() + rounded_.size() * sizeof(std::int32_t); }
+  static std::uint64_t most_bytes(const MeshParameters& parameters, const Geometry& geometry,
+                                  const std::array<std::uint32_t, 3>& dims, SampleType type);
 
  private:
   void crop(const SampleArray& samples, const SampleRange& range);

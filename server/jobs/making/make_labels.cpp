@@ -52,8 +52,16 @@ void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
   with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::Context context = progress.context();
+    const mesh::Context quiet = progress.quiet();
     const mesh::SurfaceCount count = count_walls(lattice, options, context.part(0.2, 0.4));
-    check_memory(size_of(count), lattice.dims.samples(), request);
+    std::uint64_t of_labels = 0;
+    // Each triangle is in the surfaces of two labels at most, unless labels share samples.
+    if (mesh::LabelParts(options.labels, options.values).overlap()) {
+      for (const std::uint64_t each : count_label_triangles(lattice, options, count, quiet)) {
+        of_labels += each;
+      }
+    }
+    check_memory(size_of(count), lattice.dims.samples(), request, of_labels);
     extract_walls(lattice, options, count, context.part(0.4, 1), walls);
   });
 }

@@ -116,7 +116,7 @@ CountedSurface count_surface(const SampleArray& samples, const MeshRequest& requ
 }
 
 void Workspace::trim(std::size_t budget_bytes) {
-  std::size_t held = walls.sides.capacity_bytes();
+  std::size_t held = walls.sides.capacity_bytes() + walls.owners.capacity_bytes();
   for (const mesh::Mesh& each : {std::cref(mesh), std::cref(walls.mesh)}) {
     held += each.positions.capacity_bytes() + each.triangles.capacity_bytes();
   }

@@ -96,6 +96,13 @@ struct MeshRequest {
 struct CountedSurface {
   mesh::SurfaceSize size;
   std::vector<Estimate::Label> labels = {};  // of a job by labels
+
+  // Of all labels' own surfaces.
+  std::uint64_t triangles_of_labels() const {
+    std::uint64_t sum = 0;
+    for (const Estimate::Label& label : labels) sum += label.triangles;
+    return sum;
+  }
 };
 
 // The size of the surface before the filter of components. Throws Error kCancelled.

@@ -32,7 +32,7 @@ MadeLabels make_from_samples(const SampleArray& samples, const MeshRequest& requ
   Volume volume = request.volume;
   if (cropped.is_rounded()) volume.notes.push_back(volume::rounded_note(samples.type));
   const std::uint64_t memory_bytes =
-      request.memory_bytes - std::min(request.memory_bytes, cropped.rounded_bytes());
+      request.memory_bytes - std::min(request.memory_bytes, cropped.bytes());
   const MeshRequest own = {.volume = volume,
                            .parameters = request.parameters,
                            .iso = request.iso,

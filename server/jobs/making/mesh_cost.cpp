@@ -8,8 +8,10 @@
 #include "server/codec/formats.h"
 #include "server/codec/walked_file.h"
 #include "server/jobs/making/error_budget.h"
+#include "server/mesh/collapse/bound.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/labels/separate.h"
+#include "server/mesh/measure/cavities.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/smooth/untangle.h"
 #include "server/mesh/stairs/stairs.h"
@@ -26,21 +28,34 @@ std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
 // With the room that arrays grow into.
 constexpr std::uint64_t kJoinedPerVertex = 16;
 
+// The planes of the volume's own samples. A closed surface has two layers more.
+std::uint64_t planes_of(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  const std::uint64_t around = parameters.close ? 2 : 0;
+  return surface.layers > around ? surface.layers - around : 1;
+}
+
 mesh::WritingMemory writing_memory(std::uint64_t samples, const mesh::SurfaceSize& surface,
                                    const MeshParameters& parameters) {
   return mesh::writing_memory(
       {.scheme = scheme_of(parameters.scheme), .regularize = is_regularized(parameters)},
-      samples / std::max<std::uint64_t>(1, surface.layers));
+      samples / planes_of(surface, parameters));
+}
+
+// The memory that all threads write a surface in.
+std::uint64_t writing_bytes(std::uint64_t samples, const mesh::SurfaceSize& surface,
+                            const MeshParameters& parameters) {
+  return static_cast<std::uint64_t>(mesh::thread_count()) *
+         writing_memory(samples, surface, parameters).thread_bytes;
 }
 
 // The memory of a job that never has the surface as a whole: the walk, its files, the joined
 // crossings if they are not set aside, and for each thread the topology of a window.
 std::uint64_t walked_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                           const MeshParameters& parameters) {
+                           const MeshParameters& parameters, bool has_spool) {
   // Measured: what the C library keeps of freed blocks takes up to a third of those in use, with
   // the surfaces whose bounds here are the closest; a fifth of the bounds covers it.
   constexpr std::uint64_t kHoles = 5;
-  const bool is_set_aside = sets_aside(samples);
+  const bool is_set_aside = has_spool && sets_aside(samples);
   std::uint64_t files = 0;
   for (const MeshFormat format : files_of(parameters)) {
     files += codec::walked_memory(format, parameters, surface, is_set_aside);
@@ -65,12 +80,18 @@ bool takes_more_walked(const mesh::SurfaceSize& surface, const MeshParameters& p
   return mesh::walking_memory(options, surface, {}) > 2 * whole;
 }
 
+// How many times as many surfaces labels have than if none overlapped, at least 1.
+std::uint64_t overlaps_of(const mesh::SurfaceSize& surface, std::uint64_t of_labels) {
+  const std::uint64_t usual = std::max<std::uint64_t>(1, 2 * surface.triangles);
+  return std::max<std::uint64_t>(1, (of_labels + usual - 1) / usual);
+}
+
 // The memory of labels beside their walls: the sides of the triangles, the owners of the vertices,
 // and all labels' own surfaces.
-std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
+std::uint64_t label_bytes(const mesh::SurfaceSize& surface, std::uint64_t overlaps) {
   return surface.triangles * sizeof(mesh::WallSides) +
          surface.vertices * sizeof(mesh::VertexOwner) +
-         mesh::LabelSurface::bytes(surface.vertices, surface.triangles);
+         overlaps * mesh::LabelSurface::bytes(surface.vertices, surface.triangles);
 }
 
 // The memory of untangling, simplifying and certifying, one after the other, beside the rest: the
@@ -87,9 +108,12 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
     simplifying = surface.triangles * kSimplifyBytesPerTriangle;
   }
   if (parameters.max_error_mm && !parameters.labels) {
-    const std::uint64_t points =
-        scheme_of(parameters.scheme) == Scheme::kBcc ? 2 * samples : samples;
-    simplifying = surface.triangles * kProveBytesPerTriangle + points * sizeof(float);
+    const std::uint64_t planes = planes_of(surface, parameters);
+    simplifying =
+        surface.triangles * kProveBytesPerTriangle +
+        mesh::proving_memory({.scheme = scheme_of(parameters.scheme), .close = parameters.close},
+                             planes, samples / planes) +
+        writing_bytes(samples, surface, parameters);
   }
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
   // While files are encoded, and while thickness is measured.
@@ -178,8 +202,11 @@ bool sets_aside(std::uint64_t samples) {
 }
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                              const MeshParameters& parameters, const Measures& measures) {
-  if (is_walked(surface, parameters, measures)) return walked_bytes(surface, samples, parameters);
+                              const MeshParameters& parameters, const Measures& measures,
+                              std::uint64_t of_labels, bool has_spool) {
+  if (is_walked(surface, parameters, measures)) {
+    return walked_bytes(surface, samples, parameters, has_spool);
+  }
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);
@@ -187,20 +214,27 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t sa
   const std::uint64_t smoothing = removes_stairs(parameters)
                                       ? mesh::stairs_memory(surface)
                                       : smoothing_memory(smooth_options(parameters), surface);
-  const std::uint64_t made = smoothing + (parameters.labels ? 2 * encoding : encoding) +
+  const std::uint64_t overlaps = overlaps_of(surface, of_labels);
+  const std::uint64_t made = smoothing + (parameters.labels ? 2 * overlaps * encoding : encoding) +
                              error_bytes(surface, samples, parameters, measures);
-  if (parameters.labels) return mesh_bytes(surface) + label_bytes(surface) + made;
+  if (parameters.labels) {
+    const std::uint64_t writing =
+        static_cast<std::uint64_t>(mesh::thread_count()) *
+        mesh::wall_writing_memory(samples / planes_of(surface, parameters));
+    return mesh_bytes(surface) + label_bytes(surface, overlaps) + std::max(writing, made);
+  }
   // The C library keeps what the joined crossings took, in small blocks.
   const std::uint64_t joined = is_regularized(parameters) ? surface.vertices * kJoinedPerVertex : 0;
-  const std::uint64_t writing = static_cast<std::uint64_t>(mesh::thread_count()) *
-                                writing_memory(samples, surface, parameters).thread_bytes;
-  return mesh_bytes(surface) + joined + std::max(writing, made);
+  const std::uint64_t writing = writing_bytes(samples, surface, parameters);
+  const std::uint64_t filling =
+      parameters.fill_cavities ? mesh::filling_memory(surface.vertices, surface.triangles) : 0;
+  return mesh_bytes(surface) + joined + std::max({writing, made, filling});
 }
 
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                  const MeshRequest& request) {
-  const std::uint64_t needed =
-      estimate_memory(surface, samples, request.parameters, request.measures);
+                  const MeshRequest& request, std::uint64_t of_labels) {
+  const std::uint64_t needed = estimate_memory(
+      surface, samples, request.parameters, request.measures, of_labels, request.spool != nullptr);
   const std::uint64_t allowed_bytes = request.memory_bytes;
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kMebibyte = 1 << 20;

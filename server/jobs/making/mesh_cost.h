@@ -39,13 +39,16 @@ mesh::WalkOptions walk_options(mesh::SmoothOptions smooth, const MeshParameters&
 bool sets_aside(std::uint64_t samples);
 
 // An upper estimate of a job's peak memory beside its mapped volume: mesh, smoothing, encoders,
-// simplifying and certifying. For a surface of that size in a volume of so many samples.
+// simplifying and certifying. For a surface of that size in a volume of so many samples. Labels
+// have two triangles for each of their walls together, or more if they overlap: `of_labels`.
+// Without a spool, jobs keep in memory what they would set aside.
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                              const MeshParameters& parameters, const Measures& measures);
+                              const MeshParameters& parameters, const Measures& measures,
+                              std::uint64_t of_labels = 0, bool has_spool = true);
 
 // Throws Error kTooLarge with the estimate if that exceeds the limit.
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                  const MeshRequest& request);
+                  const MeshRequest& request, std::uint64_t of_labels = 0);
 
 // Throws Error kTooLarge if the disk could never hold the files of the mesh. Half counts of sizes
 // that are guesses. Call it with the size of the mesh that is written.

@@ -7,6 +7,8 @@
 #include "proto/json.h"
 #include "server/codec/formats.h"
 #include "server/jobs/library/intact_volume.h"
+#include "server/jobs/library/label_samples.h"
+#include "server/jobs/making/crop.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/stage_times.h"
 
@@ -126,10 +128,10 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   const std::uint64_t samples = std::uint64_t{volume.dims[0]} * volume.dims[1] * volume.dims[2];
-  estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters);
-  if (parameters.labels && !is_integer(volume.type)) {
-    estimate.memory_bytes += samples * sizeof(std::int32_t);  // rounded
-  }
+  estimate.memory_bytes =
+      estimate_memory(surface, samples, parameters, parameters, counted.triangles_of_labels());
+  estimate.memory_bytes +=
+      CroppedSamples::most_bytes(parameters, volume.geometry, volume.dims, volume.type);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model(viewer);
   const VolumeSize size = VolumeSize::of(volume);
@@ -157,7 +159,7 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
     const JobOrder order = {.work = JobOrder::Work::kCount,
                             .file = file.path,
                             .volume = volume,
-                            .parameters = parameters,
+                            .parameters = with_label_samples(parameters, volume),
                             .iso = iso,
                             .memory_bytes = limits_.memory_bytes};
     return make_from_volume(blobs_, volume.samples, stop, [&] {
@@ -172,13 +174,14 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
 
 CostModel Estimator::model(const store::Viewer& viewer) const {
   CostModel costs;
-  std::map<std::string, VolumeSize> sizes;
+  std::map<std::string, std::optional<VolumeSize>> sizes;  // empty: not known any more
   for (const Job& job : jobs_.list(viewer, {.state = JobState::kSucceeded}, "", kJobsLookedAt)) {
     const std::string& id = job.parameters.volume;
-    if (!volumes_.contains(viewer, id)) continue;
     const auto [known, is_new] = sizes.try_emplace(id);
-    if (is_new) known->second = VolumeSize::of(volumes_.get(viewer, id));
-    costs.learn(job, known->second);
+    if (is_new) {
+      if (const auto volume = volumes_.find(viewer, id)) known->second = VolumeSize::of(*volume);
+    }
+    if (known->second) costs.learn(job, *known->second);
   }
   return costs;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/jobs/library/intact_volume.h"
+#include "server/jobs/library/label_samples.h"
 #include "server/jobs/making/stage_times.h"
 
 namespace isomesh::jobs {
@@ -53,7 +54,7 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   };
   const JobOrder order = {.file = file.path,
                           .volume = volume,
-                          .parameters = parameters,
+                          .parameters = with_label_samples(parameters, volume),
                           .iso = parameters.iso.value_or(volume.suggested_iso),
                           .measures = parameters,
                           .memory_bytes = limits.memory_bytes,

@@ -24,12 +24,13 @@ namespace {
 constexpr double kLeastReach = 0.25;  // of the error: with less nothing is gained
 
 // The layers of phantoms around a surface that is closed: room for T-, which is outside of its
-// caps.
+// caps. Even: a cell keeps its parity.
+constexpr std::uint32_t margin_of_steps(std::uint32_t steps) { return 2 * (1 + steps / 2); }
+constexpr std::uint32_t kMostSteps = 8;
+
 std::uint32_t margin_for(const Metric& metric, double error_mm) {
-  constexpr double kMost = 8;
-  const auto steps =
-      static_cast<std::uint32_t>(std::min(kMost, std::ceil(error_mm / metric.least_step())));
-  return 2 * (1 + steps / 2);  // even: a cell keeps its parity
+  return margin_of_steps(static_cast<std::uint32_t>(
+      std::min<double>(kMostSteps, std::ceil(error_mm / metric.least_step()))));
 }
 
 // How far rounding may move a place, in millimetres: to the copies' grid, and to the mesh's single
@@ -156,6 +157,19 @@ double BoundedMesh::bound_at(std::span<const Vec3> places) const {
     }
   }
   return most + shift_mm;
+}
+
+std::uint64_t proving_memory(const ExtractOptions& extract, std::uint64_t planes,
+                             std::uint64_t plane_samples) {
+  const std::uint64_t around =
+      extract.close ? 2 * collapse::margin_of_steps(collapse::kMostSteps) : 0;
+  const auto side =
+      static_cast<std::uint64_t>(std::ceil(std::sqrt(static_cast<double>(plane_samples))));
+  const std::uint64_t plane = plane_samples + around * (2 * side + around);
+  // Field::values has a layer behind the samples, and those of the centres are between two.
+  const bool has_centres = extract.scheme == Scheme::kBcc;
+  const std::uint64_t layers = (planes + around) * (has_centres ? 2 : 1) + (has_centres ? 3 : 1);
+  return layers * plane * sizeof(float);
 }
 
 template <class T>

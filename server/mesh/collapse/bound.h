@@ -53,11 +53,17 @@ struct BoundedMesh {
 //
 // Nothing where that cannot be proven, because the surface was regularised, single precision does
 // not tell the samples apart or parts of the surface are missing; then the mesh is as it was.
-// Beside the mesh it takes some 250 bytes a triangle and 4 bytes a sample, or 8 on the body-centred
-// lattice. Throws Error kCancelled.
+// Beside the mesh it takes some 250 bytes a triangle, for each thread what writing a surface takes
+// (windows.h), and proving_memory. Throws Error kCancelled.
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
                                            const BoundOptions& options, const Context& context,
                                            Mesh& mesh);
+
+// The memory of the samples as it reads them, in bytes: at most, but for planes that are much
+// longer than wide. Around a closed volume there are layers of others, whose number the error
+// tells. The volume has so many planes of so many samples each.
+std::uint64_t proving_memory(const ExtractOptions& extract, std::uint64_t planes,
+                             std::uint64_t plane_samples);
 
 }  // namespace isomesh::mesh

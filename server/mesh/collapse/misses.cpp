@@ -12,9 +12,10 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr double kSmallest = 1e-3;  // of the distance: the radius of a piece that is not cut
-// More than what double precision loses, of distances from needles too: a share, and millimetres.
+// More than what double precision loses, of distances from needles too: a share of the distance,
+// and of the surface's extent, as far as that is of parts of bodies.
 constexpr double kRounding = 1e-6;
-constexpr double kRoundingMm = 1e-7;
+constexpr double kMostRoundingMm = 1e-7;
 constexpr int kMostCuts = 80;            // on the way to a piece
 constexpr double kLeastSide = 1e-3;      // of a piece's radius: what a cut leaves on each side
 constexpr std::size_t kManyCorners = 8;  // of a piece: it is cut in its middle
@@ -85,13 +86,26 @@ std::array<Piece, 2> cut(const Piece& piece, const Plane& plane) {
   return parts;
 }
 
+// The distance that double precision can tell to be within the given one; 0 if it can tell none.
+double surely_within(double within_mm, const SurfaceView& surface) {
+  Reach reach;
+  for (const Vec3& position : surface.positions) reach.add({position, position});
+  double extent = 0;
+  for (std::size_t axis = 0; axis < 3 && !reach.is_empty(); ++axis) {
+    extent = std::max(extent, double{reach.high[axis]} - reach.low[axis]);
+  }
+  const double rounding_mm = std::min(kMostRoundingMm, kRounding * extent);
+  return std::max(0.0, within_mm * (1 - kRounding) - rounding_mm);
+}
+
 // Looks at one triangle after the other. Not thread safe.
 class Searcher {
  public:
+  // `within_mm`: as surely_within() gives it.
   Searcher(const WalledSurface& from, const WallGrids& to, double within_mm)
       : from_(from),
         to_(to),
-        within_(within_mm * (1 - kRounding) - kRoundingMm),
+        within_(within_mm),
         squared_within_(within_ * within_),
         guesses_(to.walls(), TriangleGrid::kNone) {}
 
@@ -216,8 +230,9 @@ std::vector<Miss> find_misses(const WalledSurface& from, std::span<const std::ui
                               const WallGrids& to, double within_mm, const Context& context) {
   constexpr std::size_t kPerTask = 2048;
   std::vector<std::vector<Miss>> found(chunks_of(which.size(), kPerTask));
+  const double within = surely_within(within_mm, from.view);
   const auto look = [&](std::size_t begin, std::size_t end) {
-    Searcher searcher(from, to, within_mm);
+    Searcher searcher(from, to, within);
     for (const std::uint32_t t : which.subspan(begin, end - begin)) {
       if (const auto miss = searcher.look_at(t)) found[begin / kPerTask].push_back(*miss);
     }

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -116,14 +115,11 @@ class Checker {
 
   // Between triangles of which a collapse changed one.
   void find_crossings(const WalledSurface& left) {
-    constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
     const auto fresh = near(left, fresh_, 0);
     const Part part(left, fresh ? &*fresh : nullptr);
-    for (const IntersectingPair& pair :
-         find_self_intersections(part.surface().view, context_, kAll).places) {
-      for (const std::uint32_t t : {part.number(pair.first), part.number(pair.second)}) {
-        if (corners_[t] != mesh_.triangles[t]) faults_.push_back(t);
-      }
+    for (const std::uint32_t n : find_intersecting_triangles(part.surface().view, context_)) {
+      const std::uint32_t t = part.number(n);
+      if (corners_[t] != mesh_.triangles[t]) faults_.push_back(t);
     }
   }
 

@@ -169,12 +169,16 @@ void SurfaceWindows::write_whole(const Context& context, Mesh& mesh) {
 }
 
 WritingMemory writing_memory(const ExtractOptions& options, std::uint64_t plane_samples) {
-  // The codes of cells, and rows around the plane.
+  // The codes of cells, signs, and rows around the plane.
   constexpr std::uint64_t kOfCells = 4;
   // Measured: 10.4 bytes on an average.
   constexpr std::uint64_t kJoinedPerVertex = 12;
+  // Two bits for each edge that clusters may have, of two planes (joined_edges-inl.h).
+  const std::uint64_t of_joined = options.scheme == Scheme::kBcc ? 8 : 4;
   const std::uint64_t indices = places_of(options.scheme) * sizeof(std::uint32_t);
-  return {plane_samples * (indices + kOfCells), options.regularize ? kJoinedPerVertex : 0};
+  const std::uint64_t plain = plane_samples * (indices + kOfCells);
+  if (!options.regularize) return {plain, 0};
+  return {plain + plane_samples * of_joined, kJoinedPerVertex};
 }
 
 void SurfaceWindows::forget(std::uint32_t begin, std::uint32_t end) { joined_->forget(begin, end); }

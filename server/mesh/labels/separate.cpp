@@ -99,6 +99,12 @@ void extract_walls(const Lattice<T>& lattice, const SeparateOptions& options,
   write_pass(separation, kSlotPlaces, context, surface.mesh, surface);
 }
 
+std::uint64_t wall_writing_memory(std::uint64_t plane_samples) {
+  // The numbers of parts, the codes of cells, and what is joined, with rows around the plane.
+  constexpr std::uint64_t kBesideIndices = 16;
+  return plane_samples * (kSlotPlaces * sizeof(std::uint32_t) + kBesideIndices);
+}
+
 #define ISOMESH_INSTANTIATE(T)                                                                  \
   template SurfaceCount count_walls(const Lattice<T>&, const SeparateOptions&, const Context&); \
   template std::vector<std::uint64_t> count_label_triangles(                                    \

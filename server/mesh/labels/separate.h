@@ -94,12 +94,15 @@ std::vector<std::uint64_t> count_label_triangles(const Lattice<T>& lattice,
                                                  const SeparateOptions& options,
                                                  const SurfaceCount& count, const Context& context);
 
-// Makes the walls in `surface`, whose memory is reused; beside it O(slice) is taken. `count` must
-// come from count_walls with the same lattice and options. The result does not depend on the number
-// of threads. Thread safe for different surfaces. Throws Error kTooLarge when 32-bit indices cannot
-// name all vertices, before memory is taken, and kCancelled.
+// Makes the walls in `surface`, whose memory is reused; beside it each thread takes
+// wall_writing_memory. `count` must come from count_walls with the same lattice and options. The
+// result does not depend on the number of threads. Thread safe for different surfaces. Throws Error
+// kTooLarge when 32-bit indices cannot name all vertices, before memory is taken, and kCancelled.
 template <class T>
 void extract_walls(const Lattice<T>& lattice, const SeparateOptions& options,
                    const SurfaceCount& count, const Context& context, SeparatingSurface& surface);
+
+// The memory in which each thread writes walls, in bytes. The volume's planes have so many samples.
+std::uint64_t wall_writing_memory(std::uint64_t plane_samples);
 
 }  // namespace isomesh::mesh

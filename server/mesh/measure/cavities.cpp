@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "server/mesh/measure/triangle_grid.h"
@@ -117,10 +118,12 @@ Dropped fill_cavities(const Context& context, Mesh& mesh) {
   const auto is_wall = [&](std::uint32_t n) {
     return shells[n].open_edges == 0 && shells[n].volume_mm3 < 0;
   };
+  const auto is_of_wall = [&](const Triangle& triangle) {
+    return is_wall(components.of_vertex[triangle[0]]);
+  };
   std::vector<Triangle> triangles;
-  for (const Triangle& triangle : mesh.triangles) {
-    if (is_wall(components.of_vertex[triangle[0]])) triangles.push_back(triangle);
-  }
+  triangles.reserve(static_cast<std::size_t>(std::ranges::count_if(mesh.triangles, is_of_wall)));
+  std::ranges::copy_if(mesh.triangles, std::back_inserter(triangles), is_of_wall);
   if (triangles.empty()) return {};
   const TriangleGrid walls({mesh.positions.span(), triangles}, quiet);
   float end_x = -std::numeric_limits<float>::infinity();
@@ -143,6 +146,14 @@ Dropped fill_cavities(const Context& context, Mesh& mesh) {
   for_chunks(context, shells.size(), find_shells, kPerTask);
   context.throw_if_stopped();
   return leave_out({stays.begin(), stays.end()}, triangles_of(components, mesh), components, mesh);
+}
+
+std::uint64_t filling_memory(std::uint64_t vertices, std::uint64_t triangles) {
+  constexpr std::uint64_t kGrid = 100;        // triangle_grid.h
+  constexpr std::uint64_t kLeastOfShell = 3;  // vertices
+  constexpr std::uint64_t kOfShell = sizeof(Shell) + sizeof(std::uint64_t) + 2;
+  return triangles * (sizeof(Triangle) + kGrid) +
+         vertices * (sizeof(std::uint32_t) + kOfShell / kLeastOfShell + 1);
 }
 
 }  // namespace isomesh::mesh

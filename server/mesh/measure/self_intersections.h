@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "server/mesh/context.h"
@@ -25,7 +26,7 @@ struct SelfIntersections {
 
   std::uint64_t pairs = 0;
   std::uint64_t triangles = 0;           // those that intersect another one
-  std::vector<IntersectingPair> places;  // the first pairs, by their numbers: `most_places`
+  std::vector<IntersectingPair> places;  // the first kMostPlaces pairs, by their numbers
 };
 
 // Decides with exact predicates on the stored positions. Two triangles intersect if they have a
@@ -36,10 +37,22 @@ struct SelfIntersections {
 // Triangles that name the same three vertices intersect. Triangles without area are skipped: they
 // are lines and no walls. Vertices at the same place with different numbers are different.
 //
-// Does not depend on the number of threads. Takes the memory of TriangleGrid, and 32 bytes a pair.
-// Throws Error kUnusableVolume for a position that is not finite, kTooLarge as TriangleGrid, and
-// kCancelled.
-SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context,
-                                          std::size_t most_places = SelfIntersections::kMostPlaces);
+// Does not depend on the number of threads. Pairs are counted, not kept: takes the memory of
+// TriangleGrid and some 8 bytes a triangle, however many intersect. Throws Error kUnusableVolume
+// for a position that is not finite, kTooLarge as TriangleGrid, and kCancelled.
+SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context);
+
+// The numbers of the triangles that intersect another one, ascending; otherwise the same.
+std::vector<std::uint32_t> find_intersecting_triangles(const SurfaceView& surface,
+                                                       const Context& context);
+
+// True if two triangles of different numbers intersect. Thread safe.
+bool intersect_each_other(const SurfaceView& surface, std::uint32_t one, std::uint32_t other);
+
+// The number of pairs that intersect, and of which is_counted(first, second) is true; the latter is
+// called from several threads. Otherwise the same.
+using IsCounted = std::function<bool(std::uint32_t first, std::uint32_t second)>;
+std::uint64_t count_intersecting_pairs(const SurfaceView& surface, const Context& context,
+                                       const IsCounted& is_counted);
 
 }  // namespace isomesh::mesh

@@ -177,6 +177,24 @@ std::uint64_t TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t firs
   return tested;
 }
 
+void TriangleGrid::visit_meeting(std::uint32_t triangle,
+                                 const std::function<void(std::uint32_t other)>& visit) const {
+  const Corners corners = corners_of(surface_, triangle);
+  const auto visit_other = [&](const Entry& entry) {
+    if (entry.triangle != triangle) visit(entry.triangle);
+  };
+  rasterise(triangle, 0, cells_[2] - 1, [&](const Cell& cell, std::uint32_t box) {
+    const Cell word = {cell[0] / kWordSide, cell[1] / kWordSide, cell[2] / kWordSide};
+    const unsigned bit = cell[0] % 4 + 4 * (cell[1] % 4) + 16 * (cell[2] % 4);
+    const auto [entries, tree] = content_at(word, levels_[0].index(word), bit);
+    if (tree != nullptr) return tree->visit_meeting(entries, corners, visit_other);
+    const std::uint32_t reached = BoxInCell::reach_of(box);
+    for (const Entry& entry : entries) {
+      if (BoxInCell::may_meet(reached, entry.box)) visit_other(entry);
+    }
+  });
+}
+
 void TriangleGrid::fill_slabs(const Context& context) {
   const std::size_t triangles = surface_.triangles.size();
   // The layers of words that each triangle reaches; a slab looks at all triangles.

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -97,6 +98,11 @@ class TriangleGrid {
       }
     }
   }
+
+  // Calls visit(other) for the other triangles of the surface that may have a point in common with
+  // this one; for some several times.
+  void visit_meeting(std::uint32_t triangle,
+                     const std::function<void(std::uint32_t other)>& visit) const;
 
   // How much was done to build it, and how much it holds.
   struct Size {

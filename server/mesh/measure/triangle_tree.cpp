@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/mesh/measure/point_triangle.h"
-
 namespace isomesh::mesh {
 namespace {
 
@@ -82,25 +80,29 @@ TriangleTree::TriangleTree(const SurfaceView& surface, const Point& centre, doub
   std::vector<Member> members;
   members.reserve(entries.size());
   for (const TriangleInCell& entry : entries) {
-    const Corners corners = corners_of(surface, entry.triangle);
-    Box box;
-    box.low = box.high = lanes(turned(minus(corners[0], centre_)));
-    for (const Point& corner : corners) {
-      const Float4 at = lanes(turned(minus(corner, centre_)));
-      box.low = at < box.low ? at : box.low;
-      box.high = at > box.high ? at : box.high;
-    }
-    auto farthest = static_cast<float>(kNear * side_mm);
-    for (int axis = 0; axis < 3; ++axis) {
-      farthest = std::max({farthest, -box.low[axis], box.high[axis]});
-    }
-    box.low -= kRounding * farthest;
-    box.high += kRounding * farthest;
-    members.push_back({box, entry});
+    members.push_back({box_of(corners_of(surface, entry.triangle)), entry});
   }
   build(members, 0, true);
   nodes_.shrink_to_fit();
   for (std::size_t n = 0; n < entries.size(); ++n) entries[n] = members[n].entry;
+}
+
+// Around the triangle, a little wider than rounding makes it.
+TriangleTree::Box TriangleTree::box_of(const Corners& corners) const {
+  Box box;
+  box.low = box.high = lanes(turned(minus(corners[0], centre_)));
+  for (const Point& corner : corners) {
+    const Float4 at = lanes(turned(minus(corner, centre_)));
+    box.low = at < box.low ? at : box.low;
+    box.high = at > box.high ? at : box.high;
+  }
+  auto farthest = static_cast<float>(kNear * side_mm_);
+  for (int axis = 0; axis < 3; ++axis) {
+    farthest = std::max({farthest, -box.low[axis], box.high[axis]});
+  }
+  box.low -= kRounding * farthest;
+  box.high += kRounding * farthest;
+  return box;
 }
 
 // Contains the box.

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/mesh/measure/point_triangle.h"
 #include "server/mesh/measure/surface_view.h"
 
 namespace isomesh::mesh {
@@ -159,6 +160,19 @@ class TriangleTree {
     }
   }
 
+  // Calls visit(entry) for the entries that may have a point in common with the triangle.
+  template <class Visit>
+  void visit_meeting(Entries entries, const Corners& corners, Visit visit) const {
+    const Box box = box_of(corners);
+    const auto visit_leaf = [&](const Node& leaf) {
+      const std::uint32_t reached = leaf.box.reach_of(box);
+      for (std::uint32_t i = leaf.begin; i < leaf.end; ++i) {
+        if (BoxInCell::may_meet(reached, entries[i].box)) visit(entries[i]);
+      }
+    };
+    descend([&](const Node& node) { return node.box.meets(box); }, visit_leaf);
+  }
+
   std::size_t nodes() const { return nodes_.size(); }
 
  private:
@@ -274,6 +288,7 @@ class TriangleTree {
   static Float4 lanes(const Point& p) {
     return Float4{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), 0};
   }
+  Box box_of(const Corners& corners) const;
   static std::uint32_t packed(const Box& box, const Box& leaf);
   void build(std::span<Member> members, std::uint32_t first, bool may_part);
   static std::size_t part_large(std::span<Member> members, const Box& bounds);

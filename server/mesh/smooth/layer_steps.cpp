@@ -124,28 +124,6 @@ float length_of(Float4 lanes) {
   return std::sqrt(squares[0] + squares[1] + squares[2]);
 }
 
-// The point between `origin` and `position` at the distance `limit` from the origin. Each
-// coordinate is rounded towards the origin, so rounding never makes it farther.
-Float4 pulled_back(const Vec3& origin, Float4 position, double limit) {
-  std::array<double, 3> way;
-  double squares = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    way[axis] = double{position[axis]} - origin[axis];
-    squares += way[axis] * way[axis];
-  }
-  const double length = std::sqrt(squares);
-  if (length <= limit) return position;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double goal = origin[axis] + way[axis] * (limit / length);
-    auto nearest = static_cast<float>(goal);
-    if (std::abs(nearest - double{origin[axis]}) > std::abs(goal - origin[axis])) {
-      nearest = std::nextafter(nearest, origin[axis]);
-    }
-    position[axis] = nearest;
-  }
-  return position;
-}
-
 // The layers that are moved by all but so many steps, for a run to be right.
 LayerRange around_run(const LayerRange& run, std::size_t steps, std::ptrdiff_t layers) {
   const auto begin = run.begin - static_cast<std::ptrdiff_t>(kBelowRun + steps);
@@ -379,7 +357,8 @@ class LayerSteps::Sweep {
     const std::size_t count = own.vertices();
     for (std::size_t v = 0; v < count; ++v) {
       const Float4 from = {origin[v][0], origin[v][1], origin[v][2], 0};
-      if (length_of(to[v] - from) > surely_within) to[v] = pulled_back(origin[v], to[v], limit);
+      if (length_of(to[v] - from) <= surely_within) continue;
+      to[v] = load(rounded_within(origin[v], {to[v][0], to[v][1], to[v][2]}, limit));
     }
   }
 
@@ -443,6 +422,24 @@ LayerRange LayerSteps::around(const Round& round, const LayerRange& run, std::pt
 }
 void LayerSteps::go_on(std::ptrdiff_t available) { sweep_->go_on(available); }
 std::ptrdiff_t LayerSteps::moved() const { return sweep_->moved(); }
+
+Vec3 rounded_within(const Vec3& origin, const Point& goal, double limit) {
+  const auto way_to = [&](const Point& point) { return minus(point, to_point(origin)); };
+  const auto length_of_way = [](const Point& way) { return std::sqrt(dot(way, way)); };
+  Vec3 rounded;
+  std::ranges::transform(goal, rounded.begin(), [](double at) { return static_cast<float>(at); });
+  if (length_of_way(way_to(to_point(rounded))) <= limit) return rounded;
+  const Point way = way_to(goal);
+  const double share = std::min(1.0, limit / length_of_way(way));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double nearer = origin[axis] + way[axis] * share;
+    rounded[axis] = static_cast<float>(nearer);
+    if (std::abs(rounded[axis] - double{origin[axis]}) > std::abs(nearer - origin[axis])) {
+      rounded[axis] = std::nextafter(rounded[axis], origin[axis]);
+    }
+  }
+  return rounded;
+}
 
 void LayerDisplacement::add(const Vec3& extracted, const Vec3& moved) {
   const Point way = minus(to_point(moved), to_point(extracted));

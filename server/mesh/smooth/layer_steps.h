@@ -10,6 +10,7 @@
 
 #include "server/mesh/measure/extent-inl.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/points.h"
 #include "server/mesh/smooth/smooth.h"
 
 namespace isomesh::mesh {
@@ -35,6 +36,10 @@ struct LayerView {
   std::size_t vertices() const { return end() - first(); }
   std::span<const Triangle> triangles() const { return mesh->triangles_of(layer, layer + 1); }
 };
+
+// The goal in single precision. If that is farther than `limit` from the origin, the point at this
+// distance on the way; each coordinate is rounded towards the origin, so it is never beyond.
+Vec3 rounded_within(const Vec3& origin, const Point& goal, double limit);
 
 // Sums over the vertices of a layer, or of several.
 struct LayerDisplacement {

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <limits>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include "server/mesh/measure/join_equal.h"
@@ -20,12 +21,6 @@ namespace {
 // The last one leads all the way to the extracted position.
 constexpr std::uint8_t kMostMoves = 5;
 
-template <class T>
-void sort_and_unite(std::vector<T>& values) {
-  std::ranges::sort(values);
-  values.erase(std::unique(values.begin(), values.end()), values.end());
-}
-
 class Untangler {
  public:
   Untangler(const UntangleOptions& options, const Context& context, Mesh& mesh)
@@ -34,7 +29,8 @@ class Untangler {
         quiet_{context.stop, nullptr},
         mesh_(mesh),
         moves_(mesh.positions.size(), 0),
-        was_moved_(mesh.positions.size(), 0) {}
+        was_moved_(mesh.positions.size(), 0),
+        is_left_(mesh.triangles.size(), false) {}
 
   UntangleEffect run(const Context& context) {
     UntangleEffect effect;
@@ -48,19 +44,19 @@ class Untangler {
     do {
       bounds = measure_extent(mesh_, quiet_);
       if (options_.rounding) rounding_ = options_.rounding(mesh_);
-      left_.clear();
-      const std::vector<Pair> found = crossings(nullptr);
-      if (is_first) effect.pairs = found.size();
+      is_left_.assign(is_left_.size(), false);
+      std::vector<std::uint32_t> found = crossing(nullptr);
+      if (is_first) effect.pairs = count_pairs(found);
       is_first = false;
       judge(found);
+      found = {};
       progress();
       while (move_back()) {
         look_again();
         progress();
       }
     } while (options_.rounding && has_other_bounds(bounds));
-    sort_and_unite(left_);
-    effect.left = left_.size();
+    effect.left = count_pairs(numbers_that([&](std::size_t t) { return bool{is_left_[t]}; }));
     effect.vertices = static_cast<std::uint64_t>(
         std::ranges::count_if(moves_, [](std::uint8_t moves) { return moves > 0; }));
     add_displacements(effect);
@@ -68,44 +64,66 @@ class Untangler {
   }
 
  private:
-  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
-
-  // Numbers of triangles.
-  using Pair = std::array<std::uint32_t, 2>;
-
   bool has_other_bounds(const Extent& before) const {
     const Extent now = measure_extent(mesh_, quiet_);
     return now.low != before.low || now.high != before.high;
   }
 
-  // The pairs of all triangles, or of these: in the positions, in the rounded ones, or in both.
-  std::vector<Pair> crossings(const std::vector<std::uint32_t>* numbers) {
+  // These triangles, or all, as arrays: in the positions, and in the rounded ones.
+  std::vector<Triangle> copy_of(const std::vector<std::uint32_t>* numbers) const {
+    if (numbers == nullptr) return {mesh_.triangles.begin(), mesh_.triangles.end()};
     std::vector<Triangle> some;
-    if (numbers != nullptr) {
-      for (const std::uint32_t t : *numbers) some.push_back(mesh_.triangles[t]);
-    } else if (options_.rounding) {
-      some.assign(mesh_.triangles.begin(), mesh_.triangles.end());
+    some.reserve(numbers->size());
+    for (const std::uint32_t t : *numbers) some.push_back(mesh_.triangles[t]);
+    return some;
+  }
+  std::vector<Triangle> rounded_copy_of(const std::vector<std::uint32_t>* numbers) {
+    std::vector<Triangle> some = copy_of(numbers);
+    rounded_.resize(mesh_.positions.size());
+    for (const Triangle& triangle : some) {
+      for (const std::uint32_t v : triangle) rounded_[v] = rounding_.rounded(mesh_.positions[v]);
     }
-    const bool is_all = numbers == nullptr && !options_.rounding;
-    std::vector<Pair> pairs;
-    const auto add = [&](const SurfaceView& surface) {
-      const SelfIntersections found = find_self_intersections(surface, quiet_, kAll);
-      for (const auto& [first, second, place] : found.places) {
-        pairs.push_back(numbers == nullptr ? Pair{first, second}
-                                           : Pair{(*numbers)[first], (*numbers)[second]});
-      }
-    };
-    if (options_.is_exact) add(is_all ? SurfaceView(mesh_) : SurfaceView(positions(), some));
+    join_equal(rounded_, some);
+    return some;
+  }
+
+  // Those of these triangles, or of all, that intersect another one of them, ascending: in the
+  // positions, in the rounded ones, or in both.
+  std::vector<std::uint32_t> crossing(const std::vector<std::uint32_t>* numbers) {
+    std::vector<std::uint32_t> found;
+    if (options_.is_exact && numbers == nullptr) {
+      found = find_intersecting_triangles(mesh_, quiet_);
+    } else if (options_.is_exact) {
+      const std::vector<Triangle> some = copy_of(numbers);
+      found = find_intersecting_triangles({positions(), some}, quiet_);
+    }
     if (options_.rounding) {
-      rounded_.resize(mesh_.positions.size());
-      for (const Triangle& triangle : some) {
-        for (const std::uint32_t v : triangle) rounded_[v] = rounding_.rounded(mesh_.positions[v]);
-      }
-      join_equal(rounded_, some);
-      add({rounded_, some});
+      const std::vector<Triangle> some = rounded_copy_of(numbers);
+      const auto rounded = find_intersecting_triangles({rounded_, some}, quiet_);
+      std::vector<std::uint32_t> both;
+      both.reserve(std::min(some.size(), found.size() + rounded.size()));
+      std::ranges::set_union(found, rounded, std::back_inserter(both));
+      found = std::move(both);
     }
-    sort_and_unite(pairs);
-    return pairs;
+    if (numbers != nullptr) {
+      for (std::uint32_t& t : found) t = (*numbers)[t];
+    }
+    return found;
+  }
+
+  // The pairs among these triangles that intersect, in some positions.
+  std::uint64_t count_pairs(const std::vector<std::uint32_t>& numbers) {
+    if (numbers.empty()) return 0;
+    const std::vector<Triangle> some = copy_of(&numbers);
+    const SurfaceView exact = {positions(), some};
+    std::uint64_t pairs = 0;
+    if (options_.is_exact) pairs += find_self_intersections(exact, quiet_).pairs;
+    if (!options_.rounding) return pairs;
+    const std::vector<Triangle> joined = rounded_copy_of(&numbers);
+    const auto is_other = [&](std::uint32_t first, std::uint32_t second) {
+      return !options_.is_exact || !intersect_each_other(exact, first, second);
+    };
+    return pairs + count_intersecting_pairs({rounded_, joined}, quiet_, is_other);
   }
 
   std::span<const Vec3> positions() const { return mesh_.positions.span(); }
@@ -115,12 +133,13 @@ class Untangler {
     return std::ranges::all_of(triangle, [&](std::uint32_t vertex) { return is_home(vertex); });
   }
 
-  void judge(const std::vector<Pair>& pairs) {
-    for (const Pair& pair : pairs) {
-      if (is_home(mesh_.triangles[pair[0]]) && is_home(mesh_.triangles[pair[1]])) {
-        left_.push_back(pair);
+  // Triangles that stand where they were extracted are left as they are; all others move.
+  void judge(const std::vector<std::uint32_t>& crossing) {
+    for (const std::uint32_t t : crossing) {
+      if (is_home(mesh_.triangles[t])) {
+        is_left_[t] = true;
       } else {
-        at_fault_.insert(at_fault_.end(), pair.begin(), pair.end());
+        at_fault_.push_back(t);
       }
     }
   }
@@ -131,13 +150,11 @@ class Untangler {
     moved_.clear();
     for (const std::uint32_t triangle : at_fault_) {
       for (const std::uint32_t vertex : mesh_.triangles[triangle]) {
-        if (!is_home(vertex)) moved_.push_back(vertex);
+        if (!is_home(vertex) && std::exchange(was_moved_[vertex], 1) == 0) moved_.push_back(vertex);
       }
     }
     at_fault_.clear();
-    sort_and_unite(moved_);
     for (const std::uint32_t vertex : moved_) {
-      was_moved_[vertex] = 1;
       Vec3& position = mesh_.positions[vertex];
       const Vec3& home = extracted_[vertex];
       const float rest = ++moves_[vertex] < kMostMoves ? 0.5F : 0.0F;
@@ -148,38 +165,49 @@ class Untangler {
     return !moved_.empty();
   }
 
-  // The numbers of the triangles for which is_one(triangle) is true, ascending.
+  // The numbers of the triangles for which is_one(number) is true, ascending.
   template <class IsOne>
-  std::vector<std::uint32_t> triangles_that(IsOne is_one) const {
+  std::vector<std::uint32_t> numbers_that(IsOne is_one) const {
     const std::size_t count = mesh_.triangles.size();
     std::vector<std::vector<std::uint32_t>> chunks(chunks_of(count));
     for_chunks(quiet_, count, [&](std::size_t begin, std::size_t end) {
       std::vector<std::uint32_t>& chunk = chunks[begin / kChunk];
       for (std::size_t t = begin; t < end; ++t) {
-        if (is_one(mesh_.triangles[t])) chunk.push_back(static_cast<std::uint32_t>(t));
+        if (is_one(t)) chunk.push_back(static_cast<std::uint32_t>(t));
       }
     });
+    std::size_t all_of_them = 0;
+    for (const auto& chunk : chunks) all_of_them += chunk.size();
     std::vector<std::uint32_t> all;
+    all.reserve(all_of_them);
     for (const auto& chunk : chunks) all.insert(all.end(), chunk.begin(), chunk.end());
     return all;
   }
 
-  // Finds what is at fault among the triangles around what was moved.
-  void look_again() {
+  // The triangles whose box is near that of one with a vertex that was moved. Those of the latter
+  // that lost their area are at fault.
+  std::vector<std::uint32_t> around_moved() {
     const SurfaceView surface = mesh_;
-    const std::vector<std::uint32_t> changed = triangles_that([&](const Triangle& triangle) {
-      return std::ranges::any_of(triangle, [&](std::uint32_t v) { return was_moved_[v] != 0; });
+    const std::vector<std::uint32_t> changed = numbers_that([&](std::size_t t) {
+      return std::ranges::any_of(mesh_.triangles[t],
+                                 [&](std::uint32_t v) { return was_moved_[v] != 0; });
     });
     std::vector<Box> boxes;
+    boxes.reserve(changed.size());
     for (const std::uint32_t t : changed) {
       const Triangle& triangle = mesh_.triangles[t];
       boxes.push_back(box_of(surface, triangle));
       if (has_no_area(mesh_, triangle) && !is_home(triangle)) at_fault_.push_back(t);
     }
     const MarkedCubes cubes(boxes, 2 * rounding_.most_mm);
-    const std::vector<std::uint32_t> around = triangles_that(
-        [&](const Triangle& triangle) { return cubes.are_near(box_of(surface, triangle)); });
-    judge(crossings(&around));
+    return numbers_that(
+        [&](std::size_t t) { return cubes.are_near(box_of(surface, mesh_.triangles[t])); });
+  }
+
+  // Finds what is at fault among the triangles around what was moved.
+  void look_again() {
+    const std::vector<std::uint32_t> around = around_moved();
+    judge(crossing(&around));
   }
 
   void add_displacements(UntangleEffect& effect) const {
@@ -203,7 +231,7 @@ class Untangler {
   std::vector<std::uint8_t> was_moved_;  // 1 for each of these
   std::vector<std::uint32_t> moved_;
   std::vector<std::uint32_t> at_fault_;  // triangles
-  std::vector<Pair> left_;
+  std::vector<bool> is_left_;            // triangles that intersect where they were extracted
   Rounding rounding_;
   std::vector<Vec3> rounded_;  // of the vertices that were looked at last
 };
@@ -216,9 +244,15 @@ UntangleEffect untangle(const UntangleOptions& options, const Context& context, 
 
 std::uint64_t untangling_memory(const SurfaceSize& size) {
   constexpr std::uint64_t kGrid = 100;  // triangle_grid.h
-  // With rounding: the triangles of joined vertices, rounded positions, and join_equal.h.
-  constexpr std::uint64_t kOfVertex = 2 * sizeof(std::uint8_t) + sizeof(Vec3) + 9;
-  return size.triangles * (kGrid + sizeof(Triangle)) + size.vertices * kOfVertex;
+  // The triangles around what was moved, as numbers and as arrays; what is at fault among them.
+  constexpr std::uint64_t kLists = sizeof(Triangle) + 5 * sizeof(std::uint32_t);
+  // With rounding: rounded positions, and join_equal.h.
+  constexpr std::uint64_t kOfVertex =
+      2 * sizeof(std::uint8_t) + sizeof(std::uint32_t) + sizeof(Vec3) + 9;
+  constexpr std::uint64_t kCubes = std::uint64_t{1} << 24;  // marked_cubes.h; before the grid
+  const std::uint64_t looking = size.triangles * (kGrid + kLists);
+  const std::uint64_t marking = size.triangles * (sizeof(Box) + kLists) + kCubes;
+  return std::max(looking, marking) + size.vertices * kOfVertex;
 }
 
 }  // namespace isomesh::mesh

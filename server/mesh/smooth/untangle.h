@@ -47,8 +47,8 @@ struct UntangleEffect {
 // indeterminate after kCancelled.
 UntangleEffect untangle(const UntangleOptions& options, const Context& context, Mesh& mesh);
 
-// An upper estimate of the memory that `untangle` takes beside the mesh and the extracted
-// positions, in bytes, without 40 for each pair.
+// An upper bound of the memory that `untangle` takes beside the mesh and the extracted positions,
+// in bytes, however many triangles intersect.
 std::uint64_t untangling_memory(const SurfaceSize& size);
 
 }  // namespace isomesh::mesh

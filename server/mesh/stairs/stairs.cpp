@@ -156,16 +156,10 @@ LayerDisplacement take_over(const WallShape& shape, const LatticeToSpace& to_spa
         const double count = double{moved[lane]} / shape.spacing()[lane];
         for (std::size_t i = 0; i < 3; ++i) way[i] += count * steps[axis][i];
       }
-      const double size = std::sqrt(dot(way, way));
-      if (size == 0) continue;
-      // A little less, so that rounding does not lead beyond.
-      constexpr double kBelow = 1 - 1e-6;
-      const double share = size > most ? most / size * kBelow : 1;
-      for (std::size_t i = 0; i < 3; ++i) {
-        mesh.positions[v][i] = static_cast<float>(mesh.positions[v][i] + way[i] * share);
-      }
-      here.sum += size * share;
-      here.largest = std::max(here.largest, size * share);
+      if (way == Point{0, 0, 0}) continue;
+      const Vec3 start = mesh.positions[v];
+      mesh.positions[v] = rounded_within(start, plus(to_point(start), way), most);
+      here.add(start, mesh.positions[v]);
     }
   };
   for_chunks(context, mesh.positions.size(), take_run, kRun);

@@ -1,6 +1,8 @@
 #include "server/mesh/stairs/wall_shape.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "server/mesh/points.h"
@@ -14,6 +16,36 @@ WallShape::WallShape(const SeparatingSurface& surface, const Dims& dims,
   fans_ = WallFans(surface, closed_ ? flags_.span() : std::span<std::uint8_t>(), context);
   find_neighbors(context);
 }
+
+namespace {
+
+// How far from a face a vertex in it may be, in samples along each axis: far from the origin, steps
+// of single precision are no small part of a sample.
+class NearFace {
+ public:
+  explicit NearFace(const LatticeToSpace& to_space) {
+    const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Point across = cross(steps[(axis + 1) % 3], steps[(axis + 2) % 3]);
+      per_mm_[axis] = std::sqrt(dot(across, across)) / std::abs(to_space.determinant());
+    }
+  }
+
+  double of(const Vec3& position, std::size_t axis) const {
+    constexpr double kLeast = 1e-3;
+    constexpr double kMost = 0.2;  // other vertices are farther
+    double rounding_mm = 0;
+    for (const float at : position) {
+      rounding_mm += std::abs(at) * double{std::numeric_limits<float>::epsilon()};
+    }
+    return std::clamp(rounding_mm * per_mm_[axis], kLeast, kMost);
+  }
+
+ private:
+  std::array<double, 3> per_mm_ = {};  // samples
+};
+
+}  // namespace
 
 void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
                       const LatticeToSpace& to_space, const Context& context) {
@@ -49,16 +81,17 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   const Lanes far = Lanes{lane(0), lane(1), lane(2), 0} * spacing_;
   low_ = smaller(near, far);
   high_ = larger(near, far);
+  const NearFace near_face(to_space);
   for_each(context, mesh.positions.size(), [&](std::size_t v) {
-    constexpr double kNear = 1e-3;  // as single precision leaves it, far from the origin
     const auto index = index_of(to_space, to_point(mesh.positions[v]));
     std::uint8_t axes = 0;
     start_[v] = Lanes{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       start_[v][static_cast<int>(axis)] = static_cast<float>(index[axis]);
       const double last = samples[axis] - 1 + beyond;
+      const double least = near_face.of(mesh.positions[v], axis);
       const bool is_in_face =
-          std::abs(index[axis] + beyond) < kNear || std::abs(index[axis] - last) < kNear;
+          std::abs(index[axis] + beyond) < least || std::abs(index[axis] - last) < least;
       if (is_in_face) axes |= static_cast<std::uint8_t>(1U << axis);
     }
     at[v] = start_[v] *= spacing_;

@@ -123,27 +123,33 @@ class Walk {
     }
   }
 
+  // Others wait for what a thread does, so any failure of one ends their waits.
   void work() {
-    for (;;) {
-      Lock lock(mutex_);
-      std::optional<Task> task;
-      while (used_ < count_ && !has_failed_ && !(task = take())) changed_.wait(lock);
-      if (!task) return;
-      lock.unlock();
-      const Clock::time_point began = Clock::now();
-      try {
-        context_.throw_if_stopped();
-        run(*task);
-      } catch (...) {
-        lock.lock();
-        has_failed_ = true;
-        changed_.notify_all();
-        throw;
+    try {
+      while (work_on_next()) {
       }
-      lock.lock();
-      complete(*std::move(task), std::chrono::duration<double>(Clock::now() - began).count());
+    } catch (...) {
+      const Lock lock(mutex_);
+      has_failed_ = true;
       changed_.notify_all();
+      throw;
     }
+  }
+
+  // Returns false if there is nothing left to do.
+  bool work_on_next() {
+    Lock lock(mutex_);
+    std::optional<Task> task;
+    while (used_ < count_ && !has_failed_ && !(task = take())) changed_.wait(lock);
+    if (!task) return false;
+    lock.unlock();
+    const Clock::time_point began = Clock::now();
+    context_.throw_if_stopped();
+    run(*task);
+    lock.lock();
+    complete(*std::move(task), std::chrono::duration<double>(Clock::now() - began).count());
+    changed_.notify_all();
+    return true;
   }
 
   void write(std::uint32_t begin, std::uint32_t end, Window& window) {

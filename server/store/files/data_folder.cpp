@@ -72,7 +72,7 @@ std::filesystem::path made(const std::filesystem::path& root) {
 }  // namespace
 
 Error missing_folder() {
-  return {ErrorCode::kUnavailable, "the storage of volumes and meshes is missing; nothing is lost"};
+  return {ErrorCode::kUnavailable, "the storage of the service is missing; nothing is lost"};
 }
 
 BlobFolders shared_blob_folders(const std::filesystem::path& root) {
@@ -123,11 +123,11 @@ bool DataFolder::is_there() const {
   const bool was_missing = is_missing_.exchange(!is);
   if (!is && !was_missing) {
     log_error(
-        "the storage of volumes and meshes is missing: the data folder is not at its place, "
-        "another folder is there, or it cannot be written to. Jobs wait until it is back. If it "
-        "was mounted anew and this goes on, restart isomeshd");
+        "the data folder is missing: it is not at its place, another folder is there, or it cannot "
+        "be written to. Jobs wait until it is back. If it was mounted anew and this goes on, "
+        "restart isomeshd");
   }
-  if (is && was_missing) log_info("the storage of volumes and meshes is back");
+  if (is && was_missing) log_info("the data folder is back");
   return is;
 }
 

@@ -15,6 +15,7 @@
 
 #include "base/text.h"
 #include "proto/error.h"
+#include "proto/json_tree.h"
 #include "server/store/sql/names.h"
 
 namespace isomesh::store::postgresql {
@@ -71,9 +72,22 @@ Oid type_of(const Parameter& parameter) {
   return 0;
 }
 
+// A text of PostgreSQL is UTF-8 and has no NUL byte. Requests may name other texts, which no record
+// has. U+FFFD in their place finds none, where a NUL byte would end the text before it.
+std::string storable(std::string_view text) {
+  const auto is_plain = [](unsigned char c) { return c > 0 && c < 0x80; };
+  if (std::ranges::all_of(text, is_plain)) return std::string(text);
+  std::string valid = valid_utf8(text);
+  constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
+  for (std::size_t at = valid.find('\0'); at != std::string::npos; at = valid.find('\0', at)) {
+    valid.replace(at, 1, kReplacement);
+  }
+  return valid;
+}
+
 std::string text_of(const Parameter& parameter) {
   if (parameter.type == Parameter::Type::kInteger) return std::to_string(parameter.integer);
-  if (parameter.type != Parameter::Type::kReal) return std::string(parameter.text);
+  if (parameter.type != Parameter::Type::kReal) return storable(parameter.text);
   std::array<char, 32> text = {};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), parameter.real).ptr;
   return {text.data(), end};

@@ -32,11 +32,22 @@ BEGIN
            CASE WHEN p_state = {job.succeeded} THEN 1 ELSE 0 END);
 END $$;
 
+-- Counts the queued jobs, those that share a part of the queue with jobs of that priority, and those of the owner among
+-- them. Urgent jobs have a part for themselves.
+CREATE OR REPLACE FUNCTION count_queued(p_owner text, p_priority int, OUT queued bigint, OUT alike bigint, OUT held bigint)
+LANGUAGE sql STABLE AS $$
+  SELECT count(*), count(*) FILTER (WHERE is_alike), count(*) FILTER (WHERE is_alike AND owner = p_owner)
+    FROM (SELECT owner, p_priority <> {priority.stat} OR priority = {priority.stat} AS is_alike
+            FROM jobs WHERE state = {job.queued}) AS q
+$$;
+
 -- Stores a job. p has the columns of jobs, and
---   latest     the latest succeeded job that is equal, as the caller saw it; null: none
---   reuses     true: the job ends at once with the mesh of `latest`, whose blobs are in `blobs`
---   most       the limit of queued jobs
---   has_share  true: the owner may queue another job
+--   latest      the latest succeeded job that is equal, as the caller saw it; null: none
+--   reuses      true: the job ends at once with the mesh of `latest`, whose blobs are in `blobs`
+--   runs_anew   true: it runs, whatever equal jobs there are
+--   most        the limit of queued jobs
+--   most_alike  of those, the limit of jobs that share a part of the queue with it
+--   is_shared   true: its owner may take no more than a share of that part, as in base/share.h
 -- Outcomes:
 --   new          the job is stored
 --   known        its idempotency key made the returned job, by the same request
@@ -44,12 +55,12 @@ END $$;
 --   full, no share, no volume
 --   look again   `latest` is out of date: repeat with the present one
 CREATE OR REPLACE FUNCTION submit_job(p jsonb) RETURNS TABLE(outcome text, job text) LANGUAGE plpgsql AS $$
-DECLARE s record; old record; n bigint; latest text;
+DECLARE s record; old record; q record; latest text;
 BEGIN
   SELECT * INTO s FROM jsonb_to_record(p) AS t(
     id text, owner text, priority int, volume text, result_key text, accepted bigint, receiver text, url text,
     idempotency_key text, request_digest text, record text, cost bigint, version int, node uuid, latest text,
-    reuses boolean, blobs jsonb, most bigint, has_share boolean);
+    reuses boolean, runs_anew boolean, blobs jsonb, most bigint, most_alike bigint, is_shared boolean);
   IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = s.id) THEN  -- repeated after a lost connection
     RETURN QUERY SELECT 'new', s.id;
     RETURN;
@@ -72,14 +83,21 @@ BEGIN
   ELSE
     SELECT j.id INTO latest FROM jobs j
       WHERE j.owner = s.owner AND j.result_key = s.result_key AND j.state = {job.succeeded} ORDER BY j.id DESC LIMIT 1;
-    IF latest IS DISTINCT FROM s.latest THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
-    SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = {job.queued} LIMIT s.most) AS q;
-    IF n > s.most - 256 THEN           -- near the limit, submissions count one after the other
-      PERFORM pg_advisory_xact_lock(hashtext('isomesh queue'), hashtext(current_schema()));
-      SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = {job.queued} LIMIT s.most) AS q;
-      IF n >= s.most THEN RETURN QUERY SELECT 'full', NULL::text; RETURN; END IF;
+    IF latest IS DISTINCT FROM s.latest AND s.runs_anew IS NOT TRUE THEN
+      RETURN QUERY SELECT 'look again', NULL::text;
+      RETURN;
     END IF;
-    IF NOT s.has_share THEN RETURN QUERY SELECT 'no share', NULL::text; RETURN; END IF;
+    SELECT * INTO q FROM count_queued(s.owner, s.priority);
+    -- Near a limit, submissions count one after the other: 256 others may be stored meanwhile, all of this owner or none.
+    IF q.queued > s.most - 256 OR (s.is_shared AND q.held + 256 > s.most_alike - q.alike - 256) THEN
+      PERFORM pg_advisory_xact_lock(hashtext('isomesh queue'), hashtext(current_schema()));
+      SELECT * INTO q FROM count_queued(s.owner, s.priority);
+    END IF;
+    IF q.queued >= s.most THEN RETURN QUERY SELECT 'full', NULL::text; RETURN; END IF;
+    IF s.is_shared AND q.held >= s.most_alike - q.alike THEN
+      RETURN QUERY SELECT CASE WHEN q.held > 0 THEN 'no share' ELSE 'full' END, NULL::text;
+      RETURN;
+    END IF;
   END IF;
   INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
                    request_digest, record, cost, version)
@@ -235,22 +253,23 @@ BEGIN
   RETURN s;
 END $$;
 
--- Reserves due callbacks for a node and returns them. Over all nodes, at most p_most for each receiver are reserved.
+-- Reserves due callbacks for a node and returns them. Over all nodes, at most p_most for each receiver are reserved. A
+-- time later than a callback may be postponed means that the clock was set back.
 CREATE OR REPLACE FUNCTION take_callbacks(p_node uuid, p_now bigint, p_most int, p_hold bigint)
 RETURNS TABLE(job text, url text, body text, attempts int, created bigint) LANGUAGE plpgsql AS $$
-DECLARE now_us bigint := isomesh_now();
+DECLARE now_us bigint := isomesh_now(); longest bigint := p_now + {callback.longest_us};
 BEGIN
-  IF NOT EXISTS (SELECT 1 FROM callbacks c WHERE c.next <= p_now) THEN RETURN; END IF;
+  IF NOT EXISTS (SELECT 1 FROM callbacks c WHERE c.next <= p_now OR c.next > longest) THEN RETURN; END IF;
   PERFORM set_config('synchronous_commit', 'off', true);
   PERFORM pg_advisory_xact_lock(hashtext('isomesh callbacks'), hashtext(current_schema()));
   UPDATE callbacks c SET node = p_node, held_until = now_us + p_hold FROM (
     SELECT t.job AS id, row_number() OVER (PARTITION BY t.receiver
              ORDER BY (t.node IS DISTINCT FROM p_node AND t.held_until > now_us) DESC, t.next, t.job) AS place,
            t.node IS DISTINCT FROM p_node AND t.held_until > now_us AS is_others
-      FROM callbacks t WHERE t.next <= p_now) AS due
+      FROM callbacks t WHERE t.next <= p_now OR t.next > longest) AS due
     WHERE c.job = due.id AND due.place <= p_most AND NOT due.is_others;
   RETURN QUERY SELECT c.job, c.url, c.body, c.attempts, c.created FROM callbacks c
-    WHERE c.node = p_node AND c.next <= p_now AND c.held_until > now_us ORDER BY c.next, c.job;
+    WHERE c.node = p_node AND (c.next <= p_now OR c.next > longest) AND c.held_until > now_us ORDER BY c.next, c.job;
 END $$;
 )sql";
 

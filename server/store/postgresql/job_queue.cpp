@@ -74,7 +74,7 @@ std::vector<Blob> blobs_told(const MeshSummary* mesh) {
 
 }  // namespace
 
-std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec) {
+std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, bool may_reuse) {
   const std::int64_t accepted = database_.now_us();
   const Time now = store::from_us(accepted);
   Job job;
@@ -85,7 +85,7 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec) {
       database_.read([&](SqlConnection& connection) { return look_up(connection, spec); })
           .value_or(Asked{});
   const std::string& key = found.result_key;
-  const auto made = made_like(spec.owner, key);
+  const auto made = may_reuse ? made_like(spec.owner, key) : std::nullopt;
   const MeshSummary* mesh = made && made->mesh && !refusing_ ? &*made->mesh : nullptr;
   if (mesh != nullptr) {
     job.reused = true;
@@ -112,10 +112,11 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec) {
       .put("node", database_.node())
       .put("latest", made ? Text(made->job) : Text())
       .put("reuses", mesh != nullptr)
+      .put("runs_anew", !may_reuse)
       .put("blobs", blobs_told(mesh))
       .put("most", refusing_ || !has_room ? 0 : options_.max_queued)
-      .put("has_share",
-           database_.read([&](SqlConnection& connection) { return has_share(connection, spec); }));
+      .put("most_alike", most_queued(spec.parameters.priority))
+      .put("is_shared", !spec.owner.empty());
   Rows row = database_.query("SELECT outcome, job FROM submit_job(?1::jsonb)", asked.text());
   row.next();
   const std::string outcome = row.text(0);

@@ -43,7 +43,7 @@ class PostgresJobStore : public SqlJobStore {
  private:
   struct Ending;
 
-  std::optional<Submission> try_to_submit(const JobSpec& spec) override;
+  std::optional<Submission> try_to_submit(const JobSpec& spec, bool may_reuse) override;
   Row row_of(const Rows& rows) const override;
   std::optional<std::chrono::microseconds> until_ready() const override;
   void tell(Event event, std::int64_t transaction) override {

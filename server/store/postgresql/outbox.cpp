@@ -19,12 +19,14 @@ std::vector<Delivery> PostgresOutbox::due(Time now, std::size_t per_receiver) co
   constexpr std::int64_t kHeldUs = std::int64_t{60} * 1'000'000;
   Rows rows = database_.query(
       "SELECT c.job, c.url, c.body, c.attempts, c.created, EXISTS(SELECT 1 FROM jobs j WHERE j.id "
-      "= c.job) FROM take_callbacks(?1::uuid, ?2, ?3::int, ?4) c",
+      "= c.job) OR EXISTS(SELECT 1 FROM expired e WHERE e.id = c.job) FROM "
+      "take_callbacks(?1::uuid, "
+      "?2, ?3::int, ?4) c",
       database_.node(), database_.to_us(now), per_receiver, kHeldUs);
   std::vector<Delivery> deliveries;
   while (rows.next()) {
     Delivery& delivery = deliveries.emplace_back(delivery_of(rows));
-    const bool is_job = rows.boolean(5);
+    const bool is_job = rows.boolean(5);  // or it was one; orders do not expire
     if (is_job) delivery.body = to_json(job_of(delivery));
   }
   return deliveries;

@@ -50,9 +50,13 @@ void erase_jobs(SqlConnection& connection, std::span<const std::string> jobs,
   if (going) going(keys);
   for (const std::string& job : jobs) {
     connection.run("DELETE FROM jobs WHERE id = ?1", job);
-    connection.run("DELETE FROM events WHERE job = ?1", job);
+    delete_events_before_end(connection, job);
     connection.run("DELETE FROM callbacks WHERE job = ?1", job);
   }
+}
+
+void delete_events_before_end(SqlConnection& connection, const std::string& job) {
+  connection.run("DELETE FROM events WHERE job = ?1 AND kind <> {event.done}", job);
 }
 
 std::uint64_t sum_of_blobs(SqlDatabase& database, const std::string& table,

@@ -19,10 +19,14 @@ std::vector<Expirable> read_expirable(const SqlDatabase& database, RecordKind ki
 // From rows of key and bytes.
 std::vector<Blob> read_blobs(Rows rows);
 
-// Erases ended jobs, with their events and their undelivered callbacks, for good: their ids are not
-// remembered. The caller has locked their rows.
+// Erases ended jobs, with their undelivered callbacks and all of their events but the end, for
+// good: their ids are not remembered. The caller has locked their rows.
 void erase_jobs(SqlConnection& connection, std::span<const std::string> jobs,
                 const BlobsGoing& going);
+
+// Deletes the events of a job whose record goes. Its end stays until all events of that time go:
+// processes that share the records may not have read it yet, and their clients wait for it.
+void delete_events_before_end(SqlConnection& connection, const std::string& job);
 
 // Total size of the blobs that column `key` of the table names; each counts once.
 std::uint64_t sum_of_blobs(SqlDatabase& database, const std::string& table, const std::string& key);

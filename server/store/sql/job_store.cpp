@@ -9,6 +9,7 @@
 #include "server/store/damaged_records.h"
 #include "server/store/job_rules.h"
 #include "server/store/sql/expiry.h"
+#include "server/store/sql/job_list.h"
 #include "server/store/sql/undamaged_rows.h"
 
 namespace isomesh::store {
@@ -24,10 +25,6 @@ std::int64_t turn_cost_us(double expected_ms) {
   constexpr double kMost = 24.0 * 3600 * 1000;
   const double bounded = std::isnan(expected_ms) ? kMost : std::clamp(expected_ms, kLeast, kMost);
   return std::llround(bounded * 1000);
-}
-
-std::optional<std::int64_t> us_of(const SqlDatabase& database, const std::optional<Time>& time) {
-  return time ? std::optional(database.to_us(*time)) : std::nullopt;
 }
 
 [[noreturn]] void throw_missing_job(SqlConnection& connection, const Viewer& viewer,
@@ -71,23 +68,16 @@ std::vector<Job> SqlJobStore::list(const Viewer& viewer, const JobFilter& filter
 
 std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, const JobFilter& filter,
                                          const std::string& after, std::size_t limit) const {
-  const auto since = us_of(records_, filter.since);
-  const auto until = us_of(records_, filter.until);
+  const JobListValues values(filter);
   std::vector<Job> jobs;
   std::string last = after;
   // Repeats only if damaged records were skipped, because fewer than `limit` jobs mean the end of
   // the list.
   for (bool is_over = false; !is_over && jobs.size() < limit;) {
-    // Conditions that are absent from the text let the query use an index.
     std::size_t left = std::min<std::size_t>(limit - jobs.size(), 1 << 30);
-    Rows rows = records_.query(select_ + "WHERE " + (viewer ? "j.owner = ?1" : "?1 IS NULL") +
-                                   (filter.state ? " AND j.state = ?2" : " AND ?2 IS NULL") +
-                                   (last.empty() ? " AND ?3 = ''" : " AND j.id < ?3") +
-                                   (filter.volume ? " AND j.volume = ?5" : " AND ?5 IS NULL") +
-                                   (since ? " AND j.accepted >= ?6" : " AND ?6 IS NULL") +
-                                   (until ? " AND j.accepted < ?7" : " AND ?7 IS NULL") +
-                                   " ORDER BY j.id DESC LIMIT ?4",
-                               viewer, filter.state, last, left, filter.volume, since, until);
+    Rows rows =
+        records_.query(select_ + job_list_query(viewer, filter, last), viewer, filter.state, last,
+                       left, values.volume, values.since, values.until, values.first_id);
     for (; rows.next(); --left) {
       const Row row = row_of(rows);
       last = row.job.id;
@@ -100,6 +90,7 @@ std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, const JobFilter& 
 
 std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, const JobFilter& filter,
                                               const std::string& after, std::size_t limit) const {
+  const JobListValues values(filter);
   std::map<std::string, Row> found;
   const auto take = [&](const Rows& rows) {
     Row row = row_of(rows);
@@ -111,8 +102,7 @@ std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, const JobFil
                      "WHERE (?1 IS NULL OR j.owner = ?1) AND (?2 IS NULL OR j.state = ?2) AND (?3 "
                      "= '' OR j.id < ?3) AND (?4 IS NULL OR j.volume = ?4) AND (?5 IS NULL OR "
                      "j.accepted >= ?5) AND (?6 IS NULL OR j.accepted < ?6)",
-                 take, viewer, filter.state, after, filter.volume, us_of(records_, filter.since),
-                 us_of(records_, filter.until));
+                 take, viewer, filter.state, after, values.volume, values.since, values.until);
   std::vector<Job> jobs;
   for (const auto& [id, row] : found) jobs.push_back(with_progress(row));
   std::ranges::reverse(jobs);
@@ -215,10 +205,10 @@ Job SqlJobStore::with_progress(const Row& row) const {
 Submission SqlJobStore::submit(const JobSpec& spec) {
   constexpr int kTries = 20;
   for (int tries = 0; tries < kTries; ++tries) {
-    if (auto submission = try_to_submit(spec)) return *std::move(submission);
+    if (auto submission = try_to_submit(spec, true)) return *std::move(submission);
   }
-  throw Error(ErrorCode::kUnavailable,
-              "the same job is submitted and removed too often: try again");
+  // Equal jobs come and go all the time, so another run makes the mesh.
+  return try_to_submit(spec, false).value();
 }
 
 std::optional<SqlJobStore::Made> SqlJobStore::made_like(const std::string& owner,
@@ -253,19 +243,28 @@ void SqlJobStore::throw_no_volume_of(SqlConnection& connection, const JobSpec& s
   throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
 }
 
-// Urgent jobs share an eighth of the queue, because all others wait for them.
-bool SqlJobStore::has_share(SqlConnection& connection, const JobSpec& spec) const {
+// Urgent jobs share an eighth of the queue, because all others wait for them. One place would be
+// the first owner's alone.
+std::size_t SqlJobStore::most_queued(Priority priority) const {
   constexpr std::size_t kStatShare = 8;
-  if (spec.owner.empty()) return true;
+  constexpr std::size_t kLeast = 2;
+  if (priority != Priority::kStat) return options_.max_queued;
+  return std::min(std::max(options_.max_queued / kStatShare, kLeast), options_.max_queued);
+}
+
+std::optional<Submission::Kind> SqlJobStore::find_no_room(SqlConnection& connection,
+                                                          const JobSpec& spec) const {
+  if (spec.owner.empty()) return std::nullopt;
   const bool is_stat = spec.parameters.priority == Priority::kStat;
   Rows row = connection.query(
       "SELECT count(*), count(CASE WHEN owner = ?1 THEN 1 END) FROM jobs WHERE state = "
       "{job.queued} AND (?2 = 0 OR priority = ?3)",
       spec.owner, is_stat, Priority::kStat);
   row.next();
-  const std::size_t room =
-      is_stat ? std::max<std::size_t>(options_.max_queued / kStatShare, 1) : options_.max_queued;
-  return isomesh::has_share(spec.owner, row.count(1), room - std::min(room, row.count(0)));
+  const std::size_t room = most_queued(spec.parameters.priority);
+  const std::size_t held = row.count(1);
+  if (has_share(spec.owner, held, room - std::min(room, row.count(0)))) return std::nullopt;
+  return held > 0 ? Submission::Kind::kOwnersShare : Submission::Kind::kBusy;
 }
 
 bool SqlJobStore::is_repaired(const Job& job) const {
@@ -428,7 +427,7 @@ Expired SqlJobStore::expire(std::span<const Expirable> jobs, std::uint64_t enoug
             read_blobs(connection.query("SELECT blob, bytes FROM meshes WHERE job = ?1", job.id));
         const std::size_t removed =
             connection.run("DELETE FROM jobs WHERE id = ?1 AND finished IS NOT NULL", job.id);
-        if (removed > 0) connection.run("DELETE FROM events WHERE job = ?1", job.id);
+        if (removed > 0) delete_events_before_end(connection, job.id);
         return removed == 0 ? std::nullopt : std::optional(std::move(blobs));
       });
 }

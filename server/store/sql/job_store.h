@@ -85,8 +85,9 @@ class SqlJobStore : public JobStore {
         select_(std::move(select)),
         records_(database) {}
 
-  // One attempt; empty if equal jobs changed meanwhile, so that the caller must retry.
-  virtual std::optional<Submission> try_to_submit(const JobSpec& spec) = 0;
+  // One attempt; empty if equal jobs changed meanwhile, so that the caller must retry. Without
+  // `may_reuse`, it takes no mesh of an equal job, and is never empty.
+  virtual std::optional<Submission> try_to_submit(const JobSpec& spec, bool may_reuse) = 0;
   virtual Row row_of(const Rows& rows) const = 0;
   // Time until the first waiting job can be claimed; empty if none waits.
   virtual std::optional<std::chrono::microseconds> until_ready() const = 0;
@@ -115,9 +116,13 @@ class SqlJobStore : public JobStore {
   // Throws Error kNotFound, or kGone if the volume has expired.
   [[noreturn]] static void throw_no_volume_of(SqlConnection& connection, const JobSpec& spec);
   bool is_full(SqlConnection& connection) const;
-  // True if the queue has room for another job of the owner: the owner's share of it
+  // The part of the queue that jobs of that priority may fill, and of which each owner has a share
   // (base/share.h).
-  bool has_share(SqlConnection& connection, const JobSpec& spec) const;
+  std::size_t most_queued(Priority priority) const;
+  // Empty if that part has room for another job of the owner. Otherwise kOwnersShare, or kBusy if
+  // the owner has no job there.
+  std::optional<Submission::Kind> find_no_room(SqlConnection& connection,
+                                               const JobSpec& spec) const;
 
   // Null if this process has no such run.
   Live* live(const std::string& id, std::uint64_t fence) ISOMESH_REQUIRES(live_mutex_);

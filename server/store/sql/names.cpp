@@ -2,21 +2,25 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cstdint>
 
 #include "base/error.h"
 #include "proto/types.h"
 #include "server/store/job_store.h"
+#include "server/store/outbox.h"
 
 namespace isomesh::store {
 namespace {
 
 struct Name {
   template <class T>
-  constexpr Name(std::string_view text, T value) : name(text), number(static_cast<int>(value)) {}
+  constexpr Name(std::string_view text, T value)
+      : name(text), number(static_cast<std::int64_t>(value)) {}
   constexpr Name(std::string_view text, Stage value) : name(text), stage(row_of(value).name) {}
 
   std::string_view name;
-  int number = 0;
+  std::int64_t number = 0;
   std::string_view stage = {};  // tables contain the names of stages, so a new one fits in anywhere
 };
 
@@ -34,6 +38,7 @@ constexpr std::array kNames = {
     Name{"priority.stat", Priority::kStat},
     Name{"priority.routine", Priority::kRoutine},
     Name{"priority.bulk", Priority::kBulk},
+    Name{"callback.longest_us", std::chrono::microseconds(kLongestPostponed).count()},
 };
 
 // Databases and their indexes contain these numbers, so they stay.

@@ -29,9 +29,9 @@ std::vector<Delivery> SqlOutbox::due(Time now, std::size_t per_receiver) const {
 std::vector<Delivery> SqlOutbox::first_due(Time now, std::size_t per_receiver) const {
   Rows rows = database_.query(
       "SELECT job, url, body, attempts, created FROM (SELECT *, row_number() OVER "
-      "(PARTITION BY receiver ORDER BY next, job) AS place FROM callbacks WHERE next <= ?1) "
-      "WHERE place <= ?2 ORDER BY next, job",
-      database_.to_us(now), per_receiver);
+      "(PARTITION BY receiver ORDER BY next, job) AS place FROM callbacks WHERE next <= ?1 OR next "
+      "> ?3) WHERE place <= ?2 ORDER BY next, job",
+      database_.to_us(now), per_receiver, database_.to_us(now + kLongestPostponed));
   std::vector<Delivery> deliveries;
   while (rows.next()) deliveries.push_back(delivery_of(rows));
   return deliveries;
@@ -46,9 +46,9 @@ std::vector<Delivery> SqlOutbox::undamaged_due(Time now, std::size_t per_receive
     deliveries.push_back(delivery_of(rows));
   };
   read_undamaged(database_, kCallbacks,
-                 "SELECT job, url, body, attempts, created, receiver FROM callbacks WHERE next <= "
-                 "?1",
-                 take, database_.to_us(now));
+                 "SELECT job, url, body, attempts, created, receiver FROM callbacks WHERE (next <= "
+                 "?1 OR next > ?2)",
+                 take, database_.to_us(now), database_.to_us(now + kLongestPostponed));
   return deliveries;
 }
 

@@ -14,8 +14,8 @@ std::vector<Event> RecentEvents::events(const Viewer& viewer, const std::string&
   while (true) {
     const std::uint64_t generation = generation_;
     const std::uint64_t end = this->end();
-    // Never for a single job: when it expires, the database removes its events but this list does
-    // not.
+    // Never for a single job: when it expires, the database removes all its events but the last,
+    // and this list none.
     const bool is_complete = job.empty() && since >= complete_after_;
     std::vector<Event> events;
     const auto begin = std::ranges::upper_bound(recent_, since, {}, &Entry::id);

@@ -46,6 +46,11 @@ std::vector<Schema> with_service(std::string tables, std::vector<Schema> compone
   service.component = "service";
   service.steps.push_back(std::move(tables));
   service.steps.emplace_back("CREATE INDEX jobs_of_volume ON jobs(owner, volume, id)");
+  // For lists of an administrator's jobs on a volume, and of jobs until a time (job_list.h).
+  service.steps.emplace_back(
+      "CREATE INDEX jobs_on_volume ON jobs(volume, id); DROP INDEX jobs_by_owner; CREATE INDEX "
+      "jobs_by_owner ON jobs(owner, id, accepted); CREATE INDEX jobs_by_time ON jobs(id, "
+      "accepted)");
   service.named_blobs =
       "SELECT blob, 'the volume ' AS what, id AS name FROM volumes UNION ALL "
       "SELECT blob, 'a mesh of the job ', job FROM meshes";

@@ -34,8 +34,8 @@ struct Records {
 [[noreturn]] void throw_damaged() { throw_damaged_volume("id"); }
 
 // Empty if there is none. Throws Error kInternal if the record is damaged.
-std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, const std::string& id,
-                           const char* lock = "") {
+std::optional<Volume> volume_at(SqlConnection& connection, const Viewer& viewer,
+                                const std::string& id, const char* lock = "") {
   Rows row = connection.query(
       std::string("SELECT coalesce(labelled, record) FROM volumes WHERE id = ?1 AND (?2 IS NULL OR "
                   "owner = ?2)") +
@@ -141,7 +141,7 @@ std::pair<Volume, bool> SqlVolumeStore::add(const std::string& owner, const Volu
 
 Volume SqlVolumeStore::get(const Viewer& viewer, const std::string& id) const {
   return database_.read([&](SqlConnection& connection) {
-    if (auto volume = find(connection, viewer, id)) return *std::move(volume);
+    if (auto volume = volume_at(connection, viewer, id)) return *std::move(volume);
     throw_missing(connection, viewer, id);
   });
 }
@@ -150,7 +150,7 @@ Volume SqlVolumeStore::rename(const std::string& owner, const std::string& id,
                               const std::optional<std::string>& name) {
   return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
-    auto volume = find(connection, owner, id, connection.for_update());
+    auto volume = volume_at(connection, owner, id, connection.for_update());
     if (!volume) throw_missing(connection, owner, id);
     volume->name = name;
     const Records records(*volume);
@@ -291,6 +291,18 @@ OwnedBytes SqlVolumeStore::owned_bytes() const {
       database_.query("SELECT owner, sum(bytes) FROM (SELECT owner, max(bytes) AS bytes FROM "
                       "volumes GROUP BY owner, "
                       "blob) AS each GROUP BY owner"));
+}
+
+std::optional<Volume> VolumeStore::find(const Viewer& viewer, const std::string& id) const {
+  try {
+    return get(viewer, id);
+  } catch (const Error& error) {
+    const bool is_gone = error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kGone;
+    if (is_gone || is_of_damaged_volume(error) || is_of_damaged_database(error)) {
+      return std::nullopt;
+    }
+    throw;
+  }
 }
 
 std::string cursor_of(const Volume& volume) { return volume.created + ' ' + volume.id; }

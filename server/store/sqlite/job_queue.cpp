@@ -78,11 +78,11 @@ std::optional<Submission> SqliteJobStore::known(Connection& connection, const Jo
                     with_progress(found(connection, std::nullopt, id))};
 }
 
-std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
+std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec, bool may_reuse) {
   // Blobs are read before the transaction, because others wait for the transaction.
   const auto before =
       database_.read([&](SqlConnection& connection) { return look_up(connection, spec); });
-  const auto made = before ? made_like(spec.owner, before->result_key) : std::nullopt;
+  const auto made = before && may_reuse ? made_like(spec.owner, before->result_key) : std::nullopt;
   Row row;
   row.owner = spec.owner;
   {
@@ -90,23 +90,23 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
     if (auto earlier = known(change.connection(), spec)) return *std::move(earlier);
     const auto asked = look_up(change.connection(), spec);
     if (!asked) throw_no_volume_of(change.connection(), spec);
-    if (!before || before->result_key != asked->result_key) return std::nullopt;  // other notes
+    const bool has_same_notes = before && before->result_key == asked->result_key;
+    if (may_reuse && !has_same_notes) return std::nullopt;
     row.result_key = asked->result_key;
     row.cost_us = asked->cost_us;
     row.accepted = now_us();
-    row.job.id = time_ordered_id();
+    row.job.id = time_ordered_id(from_us(row.accepted));
     row.job.parameters = spec.parameters;
     row.job.created = timestamp_of(from_us(row.accepted));
     const auto mesh = made ? made->mesh : std::nullopt;
     const bool is_current = mesh ? has_succeeded(change.connection(), made->job)
                                  : latest_like(change.connection(), row) == (made ? made->job : "");
-    if (!is_current) return std::nullopt;
+    if (may_reuse && !is_current) return std::nullopt;
     if (refusing_ || (!mesh && is_full(change.connection()))) {
       return Submission{Submission::Kind::kBusy, {}};
     }
-    if (!mesh && !has_share(change.connection(), spec)) {
-      return Submission{Submission::Kind::kOwnersShare, {}};
-    }
+    const auto no_room = mesh ? std::nullopt : find_no_room(change.connection(), spec);
+    if (no_room) return Submission{*no_room, {}};
     if (!mesh && !blobs_.has_room()) {
       throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
     }

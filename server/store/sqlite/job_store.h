@@ -40,7 +40,7 @@ class SqliteJobStore : public SqlJobStore {
  private:
   class Change;
 
-  std::optional<Submission> try_to_submit(const JobSpec& spec) override;
+  std::optional<Submission> try_to_submit(const JobSpec& spec, bool may_reuse) override;
   Row row_of(const Rows& rows) const override;
   std::optional<std::chrono::microseconds> until_ready() const override;
   void tell(Event event, std::int64_t) override { log_.tell(std::move(event)); }

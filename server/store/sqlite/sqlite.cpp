@@ -311,18 +311,21 @@ void Transaction::begin(Durability durability) {
   const bool is_too_weak = batch && batch->durability == Durability::kProcess;
   if (is_too_weak && durability == Durability::kFull) connection_.end_batch();
   if (!batch) {
+    auto begun = std::make_shared<Batch>();
+    begun->durability = durability;
     connection_.set_durability(durability);
     connection_.run("BEGIN IMMEDIATE");
-    batch = std::make_shared<Batch>();
-    batch->durability = durability;
+    batch = std::move(begun);
   }
   connection_.run("SAVEPOINT part");
 }
 
 void Transaction::commit() {
+  const std::shared_ptr<Batch> batch = connection_.batch_;
+  // Before other threads rely on this one to end the batch: nothing fails afterwards.
+  if (batch) batch->at_end.reserve(batch->at_end.size() + at_end_.size());
   connection_.run("RELEASE part");
   open_ = false;
-  const std::shared_ptr<Batch> batch = connection_.batch_;
   ++batch->members;
   std::ranges::move(at_end_, std::back_inserter(batch->at_end));
   // Waiting threads first add their parts. The last one commits for all.

@@ -1,11 +1,17 @@
 // Tests of which inputs are meshed separately, and of the names of their outputs.
 #include "client/cli/batch.h"
 
+#include <fstream>
+#include <string>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/text.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/output_files.h"
 #include "proto/error.h"
+#include "proto/volume_formats.h"
 #include "tests/unit/client/support.h"
 
 namespace isomesh::cli {
@@ -28,7 +34,14 @@ class Batch : public testing::Test {
     Options options;
     options.files = files;
     options.outputs = {{output, MeshFormat::kStl}};
-    return inputs_of(options);
+    return checked(options);
+  }
+
+  // As a run begins: no mesh replaces a file of the run.
+  static std::vector<Input> checked(const Options& options) {
+    std::vector<Input> inputs = inputs_of(options);
+    RunFiles(options, inputs);
+    return inputs;
   }
 
   static std::vector<std::string> names_of(const std::vector<std::filesystem::path>& files) {
@@ -49,8 +62,15 @@ class Batch : public testing::Test {
 
   static std::string refusal_of(const std::vector<std::filesystem::path>& files,
                                 const std::string& output = "{name}.stl") {
+    Options options;
+    options.files = files;
+    options.outputs = {{output, MeshFormat::kStl}};
+    return refusal_of(options);
+  }
+
+  static std::string refusal_of(const Options& options) {
     try {
-      inputs(files, output);
+      checked(options);
     } catch (const EarlyExit& refused) {
       EXPECT_EQ(refused.status(), kWrongUsage);
       return refused.what();
@@ -71,6 +91,21 @@ TEST_F(Batch, AnInputIsCalledAsItsFileWithoutSuffixes) {
   file("series.1/one.dcm");
   EXPECT_EQ(name_of_input(folder_.path() / "series.1"), "series.1");
   EXPECT_EQ(name_of_input((folder_.path() / "series.1").string() + "/"), "series.1");
+}
+
+// Python's batches have a test of the same, with the same file of cases.
+TEST_F(Batch, AFileOfEachFormatIsCalledWithoutItsSuffixes) {
+  for (const VolumeFormat& format : volume_formats()) {
+    for (const std::string_view suffix : words(format.suffixes)) {
+      EXPECT_EQ(name_of_input("scans/x" + std::string(suffix)), "x") << suffix;
+    }
+  }
+  std::ifstream cases(ISOMESH_NAMES);
+  std::string file;
+  std::string name;
+  int count = 0;
+  for (; cases >> file >> name; ++count) EXPECT_EQ(name_of_input(file), name) << file;
+  EXPECT_GT(count, 9);
 }
 
 TEST_F(Batch, FilesAreOneUploadUnlessOutputsHaveNames) {
@@ -131,8 +166,9 @@ TEST_F(Batch, InputsThatWouldOverwriteEachOtherAreRefusedByName) {
   const auto one = file("tab\x01.nii");
   const auto other = file("tab\x02.nii");
   file("a/b_c/x.nii");
-  EXPECT_THAT(refusal_of({one, other}), testing::AllOf(HasSubstr(one), HasSubstr(other)))
-      << "both outputs would have U+FFFD in their names";
+  EXPECT_THAT(refusal_of({one, other}),
+              HasSubstr(printable(one.string()) + " and " + printable(other.string())))
+      << "both outputs would have U+FFFD in their names, and so have the files in the message";
   const auto left = file("a/b_c/x.nii");
   const auto right = file("a_b/c/x.nii");
   EXPECT_THAT(refusal_of({left, right}), testing::AllOf(HasSubstr(left), HasSubstr(right)));
@@ -191,10 +227,58 @@ TEST_F(Batch, LongNamesOfMembersAreCut) {
 }
 
 TEST_F(Batch, EachOutputIsTakenOnce) {
-  TakenOutputs taken;
-  EXPECT_TRUE(taken.take({{"x.stl", MeshFormat::kStl}, {"x.glb", MeshFormat::kGlb}}));
-  EXPECT_FALSE(taken.take({{"y.stl", MeshFormat::kStl}, {"./x.glb", MeshFormat::kGlb}}));
-  EXPECT_TRUE(taken.take({{"y.stl", MeshFormat::kStl}}));
+  RunFiles files({}, {});
+  const auto is_taken = [&](const std::vector<Output>& outputs, const std::string& owner) {
+    const auto clash = files.take(outputs, owner);
+    EXPECT_TRUE(!clash || clash->owner == "one");
+    return !clash;
+  };
+  EXPECT_TRUE(is_taken({{"x.stl", MeshFormat::kStl}, {"x.glb", MeshFormat::kGlb}}, "one"));
+  EXPECT_TRUE(is_taken({{"x.stl", MeshFormat::kStl}}, "one"));
+  EXPECT_FALSE(is_taken({{"y.stl", MeshFormat::kStl}, {"./x.glb", MeshFormat::kGlb}}, "two"));
+  EXPECT_TRUE(is_taken({{"y.stl", MeshFormat::kStl}}, "two"));
+}
+
+TEST_F(Batch, MaterialsAreFilesOfAMesh) {
+  Options options;
+  options.files = {file("a b.nii"), file("a_b.nii")};
+  options.outputs = {{folder_ / "{name}.obj", MeshFormat::kObj}};
+  EXPECT_EQ(refusal_of(options), "") << "without labels there are none";
+  options.parameters.labels.emplace();
+  EXPECT_THAT(refusal_of(options),
+              testing::AllOf(HasSubstr(options.files[0]), HasSubstr(options.files[1]),
+                             HasSubstr(folder_ / "a_b.mtl")));
+  // A volume is recognised by its content, so it may have any name.
+  options.files = {file("c.nii"), file("c.mtl")};
+  EXPECT_THAT(refusal_of(options), HasSubstr("would overwrite the volume"));
+}
+
+TEST_F(Batch, LinksAreTheFilesThatTheyLeadTo) {
+  std::filesystem::create_directories(folder_ / "real");
+  std::filesystem::create_directory_symlink("real", folder_ / "link");
+  std::filesystem::create_symlink("real/z.stl", folder_ / "z.stl");
+  RunFiles files({}, {});
+  EXPECT_FALSE(files.take({{folder_ / "real/x.stl", MeshFormat::kStl}}, "one"));
+  EXPECT_TRUE(files.take({{folder_ / "link/x.stl", MeshFormat::kStl}}, "two"));
+  EXPECT_FALSE(files.take({{folder_ / "real/z.stl", MeshFormat::kStl}}, "one"));
+  EXPECT_TRUE(files.take({{folder_ / "z.stl", MeshFormat::kStl}}, "two"));
+}
+
+// The names of an archive's members are known after its upload.
+TEST_F(Batch, NoMeshOfAMemberReplacesAnInput) {
+  Options options;
+  options.files = {file("arch.zip"), file("other.vtk"), file("set/one.vtk")};
+  // A folder that cannot be uploaded keeps its files, too.
+  options.files.back() = options.files.back().parent_path();
+  std::filesystem::create_symlink("nowhere", folder_ / "set/dangling");
+  options.outputs = {{folder_ / "meshes-{name}.vtk", MeshFormat::kVtk}};
+  const std::vector<Input> inputs = inputs_of(options);
+  RunFiles files(options, inputs);
+  for (const std::string volume : {"other.vtk", "set/one.vtk"}) {
+    const auto clash = files.take({{folder_ / volume, MeshFormat::kVtk}}, "arch: other.nii");
+    ASSERT_TRUE(clash) << volume;
+    EXPECT_EQ(clash->owner, "");
+  }
 }
 
 class UpToDate : public Batch {
@@ -208,9 +292,7 @@ class UpToDate : public Batch {
 
   bool is(const std::vector<std::filesystem::path>& files,
           const std::vector<std::filesystem::path>& outputs) const {
-    std::vector<Output> all;
-    for (const auto& path : outputs) all.push_back({path, MeshFormat::kStl});
-    return is_up_to_date({files, {}}, all);
+    return is_up_to_date({files, {}}, outputs);
   }
 
   std::filesystem::file_time_type begin_ =

@@ -290,6 +290,17 @@ TEST_F(PatienceTest, BeginsAnewIfTheServerHasMore) {
   EXPECT_TRUE(patience_.is_over());
 }
 
+// Two daemons answer in turn, and one has nothing of the upload.
+TEST_F(PatienceTest, GoesOnForNothingThatWasReachedBefore) {
+  patience_.hear(1'000'000);
+  patience_.fail();
+  for (int n = 0; n < 6; ++n) {
+    pass(seconds{10});
+    patience_.hear(n % 2 == 0 ? 0 : 1'000'000);
+  }
+  EXPECT_TRUE(patience_.is_over());
+}
+
 // The server was there, and asked for the time.
 TEST_F(PatienceTest, DoesNotCountTheTimeThatABusyServerAskedFor) {
   patience_.excuse(seconds{100});

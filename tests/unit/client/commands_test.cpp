@@ -137,7 +137,7 @@ TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
   });
   EXPECT_EQ(outcome_of(options_).err,
             "isomesh: line\n\uFFFD[2J\n"
-            "    --member a\uFFFD[31m.nrrd  x\uFFFDy\uFFFD\n  --accept c\uFFFD\n");
+            "    --member 'a\uFFFD[31m.nrrd'  # x\uFFFDy\uFFFD\n  --accept 'c\uFFFD'\n");
 }
 
 TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {

@@ -88,6 +88,21 @@ TEST(PartFile, ReplacesAFileThatAppearsMeanwhile) {
   }
 }
 
+TEST(PartFile, ReplacesNothingIfItShallNot) {
+  for (const PartFile::Until kind : kKinds) {
+    const test::TemporaryFolder folder;
+    PartFile file(folder / "mesh.drc", kind, Existing::kRefuse);
+    file.write("mesh");
+    PartFile late(folder / "mesh.drc", kind, Existing::kRefuse);
+    late.write("late");
+    file.publish();
+    EXPECT_EQ(error_of([&] { late.publish(); }).code(), ErrorCode::kInvalidParameter);
+    EXPECT_EQ(test::read_file(folder / "mesh.drc"), "mesh");
+    EXPECT_EQ(error_of([&] { PartFile(folder / "mesh.drc", kind, Existing::kRefuse); }).code(),
+              ErrorCode::kInvalidParameter);
+  }
+}
+
 TEST(PartFile, TakesTheLongestName) {
   TemporaryFolder folder;
   const std::string name(255, 'a');

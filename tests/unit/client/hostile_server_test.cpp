@@ -80,6 +80,57 @@ TEST(HostileServer, SendsAnEndlessBody) {
   EXPECT_EQ(error_of([&] { client.volumes(); }).code(), ErrorCode::kInternal);
 }
 
+TEST(HostileServer, SendsAnEventWithoutEnd) {
+  SocketServer server([](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, "HTTP/1.1 200 OK\r\n\r\nevent: done\n");
+    const std::string line = "data: " + std::string(1000, 'a') + '\n';
+    for (int n = 0; n < 20'000; ++n) test::send_text(socket, line);
+  });
+  Client client({.server = server.url()});
+  EXPECT_STREQ(error_of([&] { client.follow("7", {}); }).what(),
+               "the server's events do not match the API");
+}
+
+TEST(HostileServer, SendsPagesWithoutEnd) {
+  const std::string page = R"({"volumes": [)" + to_json(test::some_volume()) +
+                           R"(], "next": "more", "more": ")" +
+                           std::string(std::size_t{60} << 20, 'a') + "\"}";
+  test::FakeServer server;
+  server.http.Get("/v1/volumes", test::answering(page));
+  Client client({.server = server.start()});
+  EXPECT_EQ(error_of([&] { client.volumes(); }).code(), ErrorCode::kInternal);
+}
+
+// Each result of an upload is a volume or a problem.
+TEST(HostileServer, AnswersAnUploadWithOtherResults) {
+  const std::string volume = to_json(test::some_volume());
+  const std::string problem = to_json(to_problem(Error(ErrorCode::kTooLarge, "large"), ""));
+  const auto result = [](const std::string& of_volume, const std::string& of_problem) {
+    return R"({"member": "a", "status": 201, "volume": )" + of_volume + R"(, "problem": )" +
+           of_problem + '}';
+  };
+  std::string results;
+  test::FakeServer server;
+  server.http.Post("/v1/volumes", [&](const auto&, auto& response, const auto& read) {
+    read([](const char*, std::size_t) { return true; });
+    response.status = 207;
+    response.set_content("{\"volumes\": [" + results + "]}", "application/json");
+  });
+  test::TemporaryFolder folder;
+  test::write_file(folder / "a", "x");
+  Client client({.server = server.start()});
+  const auto code = [&](const std::string& answer) {
+    results = answer;
+    return error_of([&] { client.upload_all({folder / "a"}); }).code();
+  };
+  EXPECT_EQ(code(""), ErrorCode::kInternal);
+  EXPECT_EQ(code(result("null", "null")), ErrorCode::kInternal);
+  EXPECT_EQ(code(result(volume, "null") + ',' + result("null", "null")), ErrorCode::kInternal);
+  EXPECT_EQ(code(result(volume, problem)), ErrorCode::kInternal);
+  EXPECT_EQ(code(result("null", problem)), ErrorCode::kTooLarge);
+}
+
 // As a portal of a network does.
 TEST(HostileServer, IsOneOfPagesAndNotOfTheApi) {
   std::string status = "200 OK";

@@ -376,6 +376,13 @@ TEST_F(Fetch, GoesOnWhereTheConnectionBrokeOrStartsOver) {
   }
 }
 
+// A job by labels whose OBJ has these bytes.
+Job labelled_job(const std::string& obj) {
+  Job job = finished_job("7", obj, MeshFormat::kObj);
+  job.parameters.labels.emplace();
+  return job;
+}
+
 // The name of the materials is replaced in these bytes, which wait until they are complete.
 TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
   const std::string line = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
@@ -389,7 +396,7 @@ TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
           return test::answer(socket, "200 OK", "newmtl a\n");
         }
         if (head.find("mesh.obj") == std::string::npos) {
-          return test::answer(socket, "200 OK", to_json(finished_job("7", mesh, MeshFormat::kObj)));
+          return test::answer(socket, "200 OK", to_json(labelled_job(mesh)));
         }
         send_mesh(socket, mesh, knows_ranges ? head : "", ++asked < 3 ? 20 : -1);
       });
@@ -405,8 +412,7 @@ TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
 
 TEST_F(Fetch, PutsTheMaterialsBesideTheFileBehindALink) {
   const std::string mesh = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
-  server_.http.Get("/v1/jobs/7",
-                   test::answering(to_json(finished_job("7", mesh, MeshFormat::kObj))));
+  server_.http.Get("/v1/jobs/7", test::answering(to_json(labelled_job(mesh))));
   server_.http.Get("/v1/jobs/7/mesh.obj", test::answering(mesh, "model/obj"));
   server_.http.Get("/v1/jobs/7/mesh.mtl", test::answering("newmtl a\n", "model/mtl"));
   Client client({.server = server_.start()});
@@ -419,6 +425,50 @@ TEST_F(Fetch, PutsTheMaterialsBesideTheFileBehindALink) {
   client.fetch("7", MeshFormat::kObj, folder_ / "mesh");
   EXPECT_EQ(test::read_file(folder_ / "mesh"), mesh);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "mesh.mtl"));
+}
+
+TEST_F(Fetch, NamesEveryFileThatItWrites) {
+  using Files = std::vector<std::filesystem::path>;
+  EXPECT_EQ(files_of_mesh("a/x y.tar.obj", MeshFormat::kObj, true),
+            (Files{"a/x y.tar.obj", "a/x_y.tar.mtl"}));
+  EXPECT_EQ(files_of_mesh("X.OBJ", MeshFormat::kObj, true), (Files{"X.OBJ", "X.mtl"}));
+  for (const bool is_by_labels : {true, false}) {
+    EXPECT_EQ(files_of_mesh("x.stl", MeshFormat::kStl, is_by_labels), Files{"x.stl"});
+    EXPECT_EQ(files_of_mesh("pipe", MeshFormat::kObj, is_by_labels), Files{"pipe"});
+  }
+  EXPECT_EQ(files_of_mesh("x.obj", MeshFormat::kObj, false), Files{"x.obj"});
+}
+
+TEST_F(Fetch, ReplacesNoFileIfItShallNot) {
+  const std::string mesh = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
+  server_.http.Get("/v1/jobs/7", test::answering(to_json(labelled_job(mesh))));
+  // Another program is quicker.
+  std::string quicker;
+  server_.http.Get("/v1/jobs/7/mesh.obj", [&](const auto&, httplib::Response& response) {
+    if (!quicker.empty()) test::write_file(folder_ / quicker, "another's");
+    response.set_content(mesh, "model/obj");
+  });
+  server_.http.Get("/v1/jobs/7/mesh.mtl", test::answering("newmtl a\n", "model/mtl"));
+  Client client({.server = server_.start()});
+  const auto fetch = [&](const std::string& name) {
+    client.fetch("7", MeshFormat::kObj, folder_ / name, {}, {}, Existing::kRefuse);
+  };
+  fetch("new.obj");
+  EXPECT_EQ(test::read_file(folder_ / "new.mtl"), "newmtl a\n");
+  std::filesystem::create_symlink("far", folder_ / "link.mtl");
+  test::write_file(folder_ / "old.mtl", "another's");
+  for (const std::string name : {"new", "old", "link"}) {
+    EXPECT_THAT(error_of([&] { fetch(name + ".obj"); }).what(), HasSubstr("File exists")) << name;
+  }
+  for (const std::string late : {"late.obj", "late.mtl"}) {
+    quicker = late;
+    EXPECT_THAT(error_of([&] { fetch("late.obj"); }).what(), HasSubstr(late + ": File exists"));
+    EXPECT_EQ(test::read_file(folder_ / late), "another's");
+    std::filesystem::remove(folder_ / "late.obj");
+    std::filesystem::remove(folder_ / "late.mtl");
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "far"));
+  EXPECT_EQ(test::read_file(folder_ / "old.mtl"), "another's");
 }
 
 TEST_F(Fetch, NamesATargetThatCannotBeWritten) {

@@ -1,13 +1,18 @@
 // Our own encoder of Draco streams, held against libdraco's decoder.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <new>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "server/codec/draco/chunks.h"
 #include "server/codec/draco/encoder.h"
 #include "server/codec/encode.h"
 #include "tests/support/errors.h"
@@ -321,6 +326,19 @@ TEST(OwnDraco, PositionsThatAreNoPlacesAreAnError) {
                 ErrorCode::kUnusableVolume);
     }
   }
+}
+
+// As one that runs out of memory: a helper waits for no more items.
+TEST(DracoChunks, EndTheirHelpersWhenTheProducerFails) {
+  Chunks chunks;
+  std::atomic<std::uint32_t> worked = 0;
+  const auto work = [&](std::uint32_t begin, std::uint32_t end) { worked += end - begin; };
+  const std::jthread helper([&] { chunks.help(work); });
+  const auto fail = [](const auto& bring) {
+    bring(5000);
+    throw std::bad_alloc();
+  };
+  EXPECT_THROW(chunks.produce(work, fail), std::bad_alloc);
 }
 
 // Draco's decoder refuses streams with more than four faces for three symbols.

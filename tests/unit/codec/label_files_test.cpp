@@ -89,6 +89,23 @@ TEST_F(LabelFilesTest, TitlesThatAreAlikeOrNoFileNamesMakeNoTwoFilesOne) {
                                              "same-3.stl"}));
 }
 
+// Windows and macOS ignore the case of all letters, and macOS how they are composed.
+TEST_F(LabelFilesTest, NamesInAZipDifferInMoreThanTheCaseOfLettersBeyondAscii) {
+  labels_[0].name = "\u00c4derchen";
+  labels_[1].name = "\u00e4derchen";
+  labels_[2].name = "a\u0308derchen";
+  labels_[3].name = "\u0421\u0415\u0420\u0414\u0426\u0415";
+  labels_[4].name = "\u0441\u0435\u0440\u0434\u0446\u0435";
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : unzipped(zipped({MeshFormat::kStl}).bytes))
+    names.push_back(name);
+  // libarchive composes letters.
+  EXPECT_THAT(names, testing::UnorderedElementsAre("\u00c4derchen.stl", "\u00e4derchen-2.stl",
+                                                   "\u00e4derchen-3.stl",
+                                                   "\u0421\u0415\u0420\u0414\u0426\u0415.stl",
+                                                   "\u0441\u0435\u0440\u0434\u0446\u0435-5.stl"));
+}
+
 TEST_F(LabelFilesTest, NoNameInAZipIsADeviceOfWindows) {
   labels_[0].name = "con";
   labels_[1].name = "LPT1.left";

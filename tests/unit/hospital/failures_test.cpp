@@ -22,6 +22,33 @@ TEST_F(OrdersTest, OfAStudyOfAnotherPatientWaitLongerEachTime) {
   EXPECT_FALSE(get(id).error);
 }
 
+TEST_F(OrdersTest, OfAPacsThatAsksForMonthsWaitAWeek) {
+  stop();
+  settings_.give_up = hours(24 * 300);
+  begin();
+  main_->retry_after = static_cast<int>(seconds(hours(24 * 100)).count());
+  main_->is_down = true;
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return get(id).attempts > 0; }));
+  EXPECT_LE(time_of(get(id).next_attempt.value()), now() + store::kLongestWait);
+  EXPECT_TRUE(store_.due(now(), 1).empty());
+  pass(store::kLongestWait);
+  EXPECT_TRUE(until([&] { return get(id).attempts == 2; }));
+}
+
+TEST_F(OrdersTest, ThatSettleForMonthsAreDueAfterAWeek) {
+  stop();
+  settings_.settle = hours(24 * 100);
+  settings_.poll = hours(24 * 100);
+  begin();
+  submit();
+  ASSERT_TRUE(until([&] { return main_->calls > 0; }));
+  EXPECT_TRUE(until([&] { return store_.due(now(), 1).empty(); }));
+  const int calls = main_->calls;
+  pass(store::kLongestWait);
+  EXPECT_TRUE(until([&] { return main_->calls > calls; }));
+}
+
 TEST_F(OrdersTest, OfASeriesOfTwoPatientsFailAtOnce) {
   main_->foreign_slice = kSlices - 1;
   const std::string id = submit();
@@ -242,7 +269,20 @@ TEST_F(OrdersTest, OutliveAWeekendsOutage) {
   ASSERT_TRUE(finish_job());
   EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
   EXPECT_FALSE(get(id).error);
-  EXPECT_EQ(orders_->attempts().front().fault, PacsFault::kUnreachable);
+  for (const Attempts& attempts : orders_->attempts()) {
+    const bool has_failed = attempts.pacs == "main" && attempts.fault == PacsFault::kUnreachable;
+    EXPECT_EQ(attempts.count > 0, has_failed) << attempts.pacs << ' ' << to_string(attempts.fault);
+  }
+}
+
+// A rate needs a first sample.
+TEST_F(OrdersTest, FailuresAreCountedFromTheStart) {
+  const std::vector<Attempts> all = orders_->attempts();
+  for (const PacsFault fault : kPacsFaults) {
+    EXPECT_TRUE(std::ranges::any_of(all, [&](const Attempts& each) {
+      return each.pacs == "main" && each.fault == fault && each.count == 0;
+    })) << to_string(fault);
+  }
 }
 
 TEST_F(OrdersTest, GiveUpAndAreTriedAnew) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <span>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -108,8 +109,13 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::function<void()> on_fetched;           // called when the images have come
 
   RecentSeries find_recent(const std::string&, const std::string&,
-                           const std::stop_token&) override {
-    return {};
+                           const std::stop_token& stop) override {
+    answer(stop);
+    return {.series = {{.study = kStudy,
+                        .series = kSeries,
+                        .modality = "CT",
+                        .description = "",
+                        .instances = std::nullopt}}};
   }
   std::optional<FoundSeries> find_series(const std::string&, const std::string& series,
                                          const std::stop_token& stop) override {
@@ -168,9 +174,18 @@ class FakePacs : public Archive, public ObjectReceiver {
   void store(const OutgoingObject& object, const std::stop_token& stop) override {
     answer(stop);
     ++stores;
+    std::string bytes(object.bytes, ' ');
+    object.read(0, std::as_writable_bytes(std::span(bytes)));
     const Lock lock(mutex_);
     stored_.insert(object.place.instance);
+    last_object_ = bytes;
     after_store();
+  }
+
+  // The bytes of the object that was stored last.
+  std::string last_object() {
+    const Lock lock(mutex_);
+    return last_object_;
   }
 
   // From now on the series has these files instead of its slices.
@@ -218,6 +233,7 @@ class FakePacs : public Archive, public ObjectReceiver {
 
   Mutex mutex_;
   std::set<std::string> stored_ ISOMESH_GUARDED_BY(mutex_);
+  std::string last_object_ ISOMESH_GUARDED_BY(mutex_);
   std::vector<std::string> held_ ISOMESH_GUARDED_BY(mutex_);
   PacsSeriesList searchable_ ISOMESH_GUARDED_BY(mutex_);
   SeriesQuery asked_ ISOMESH_GUARDED_BY(mutex_);

@@ -59,6 +59,21 @@ TEST(DataSet, IsCutAtATag) {
             data.bytes());
 }
 
+// A length that is cut would make the rest of the value look like elements: those of the patient,
+// if somebody has written them there.
+TEST(DataSet, HasNoValueThatIsTooLongForItsElement) {
+  constexpr std::size_t kMost = 65'534;
+  DataSet data;
+  data.set(0x00081030, "LO", std::string(kMost, 'x'));
+  EXPECT_EQ(data.bytes().size(), 8 + kMost);
+  data.set(0x00081030, "LO", std::string(kMost + 1, 'x'));
+  const Error error = test::error_of([&] { data.bytes(); });
+  EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
+  EXPECT_THAT(error.what(), HasSubstr("(0008,1030)"));
+  data.set(0x00081030, "UT", std::string(kMost + 1, 'x'));
+  EXPECT_EQ(data.bytes().size(), 12 + kMost + 2);
+}
+
 class EnvelopeTest : public testing::Test {
  protected:
   dicom::Envelope made(std::uint64_t bytes) {

@@ -4,6 +4,7 @@
 #include "proto/dicom_uid.h"
 #include "server/hospital/protocol/orders.h"
 #include "tests/support/errors.h"
+#include "tests/support/flips.h"
 
 namespace isomesh {
 namespace {
@@ -59,6 +60,21 @@ TEST(OrderJson, OrdersComeAsTheyWent) {
   EXPECT_EQ(order_work_from_record(to_record(some_work())), some_work());
   const std::vector<PacsStatus> pacs = {{.name = "main", .reason = "timeout"}};
   EXPECT_EQ(pacs_from_json(to_json(pacs)), pacs);
+}
+
+TEST(OrderJson, NamesOtherObjectsByTheirIds) {
+  for (const auto member : {&Order::job, &Order::volume, &Order::label_volume}) {
+    Order odd = some_order();
+    odd.*member = "$(id)";
+    EXPECT_EQ(test::code_thrown_by([&] { order_from_json(to_json(odd)); }), ErrorCode::kInternal);
+    EXPECT_EQ(orders_from_json(to_json(std::vector{odd, some_order()})), std::vector{some_order()});
+  }
+}
+
+TEST(OrderJson, RecordsWithAWrongByteAreNoOthers) {
+  EXPECT_EQ(order_from_record(to_record(some_order())), some_order());
+  test::expect_wrong_bytes_found(to_record(some_order()), order_from_record);
+  test::expect_wrong_bytes_found(to_record(some_work()), order_work_from_record);
 }
 
 TEST(OrderJson, RecordsOfAnOlderVersionAreRead) {

@@ -128,5 +128,20 @@ TEST_F(ReportingOrdersTest, ThatAreRepeatedHaveTheSameReport) {
   EXPECT_EQ(main_->stores, 1);
 }
 
+// AlgorithmParameters can have 10 240 characters.
+TEST_F(OrdersTest, WithLongParametersHaveAnObjectThatTellsTheirBeginning) {
+  std::string places;
+  for (int n = 0; n < 900; ++n) places += (n > 0 ? "," : "") + std::string("[0.123456789,1,2]");
+  const std::string id =
+      submit("main", kSeries, R"({"iso": 100, "components": {"nearest_to": [)" + places + "]}}");
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded)) << get(id).error->detail;
+  const std::string object = main_->last_object();
+  const std::size_t parameters = object.find(std::string("\x66\0\x32\0LT", 6));
+  ASSERT_NE(parameters, object.npos);
+  EXPECT_EQ(object.substr(parameters + 6, 3), std::string("\0\x28{", 3));  // 10 240, and the text
+  EXPECT_EQ(object.substr(parameters + 8 + 10'240 - 3, 3), "...");
+}
+
 }  // namespace
 }  // namespace isomesh::orders

@@ -119,6 +119,13 @@ TEST_F(SegmentationTest, HasABitForEachSampleAndSegment) {
   EXPECT_EQ(bits_of(grid, {8}), "");
 }
 
+// 0 is a label like others if a job has another background.
+TEST_F(SegmentationTest, HasSlicesThatAreWhollyOneLabel) {
+  const std::vector<std::uint8_t> samples = {0, 0, 0, 0, 0, 0,  //
+                                             5, 5, 5, 5, 5, 5};
+  EXPECT_EQ(bits_of(grid_of(samples, kImages), {0, 5}), "1@0 2@1 111111111111....");
+}
+
 TEST_F(SegmentationTest, HasTheOrderOfTheImages) {
   const std::vector<float> samples = {0, 1, 1, 2, 0, 0.4F,  //
                                       0, 0, 0, 2, 1, 0};
@@ -126,6 +133,25 @@ TEST_F(SegmentationTest, HasTheOrderOfTheImages) {
   EXPECT_EQ(bits_of(grid_of(samples, flipped()), {1, 2}),
             "1@0 1@1 2@0 2@1 .1........111.....1....."
             "........");
+}
+
+// They are counted before they are all in memory: noise has most labels in each slice.
+TEST_F(SegmentationTest, OfTooManyFramesIsRefusedWhileTheyAreCounted) {
+  constexpr std::uint32_t kSide = 256;
+  LabelGrid grid = grid_of(std::vector<std::uint16_t>(kSizes[0] * kSizes[1] * kSizes[2]), kImages);
+  grid.dims = {kSide, kSide, 2};
+  std::string file(volume::kHeaderBytes, ' ');
+  std::vector<std::int64_t> labels;
+  for (std::uint32_t slice = 0; slice < 2; ++slice) {
+    for (std::uint32_t label = 0; label < kSide * kSide; ++label) {
+      file += static_cast<char>(label & 0xff);
+      file += static_cast<char>(label >> 8);
+      if (slice == 0) labels.push_back(label);
+    }
+  }
+  grid.samples = test::put(blobs_, file).key;
+  EXPECT_EQ(test::code_thrown_by([&] { frames_of(grid, labels, blobs_, {}); }),
+            ErrorCode::kTooLarge);
 }
 
 TEST(SegmentationHead, DescribesSegmentsAndFrames) {

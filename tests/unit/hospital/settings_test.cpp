@@ -105,6 +105,8 @@ TEST(HospitalSettings, NamesWhatIsWrong) {
       {with("iso = 250", "iso = \"much\""), "rules[0].parameters.iso"},
       {with("settle-seconds = 7", "settle-seconds = \"7\""), "orders.settle-seconds"},
       {with("settle-seconds = 7", "settle-seconds = -1"), "orders.settle-seconds"},
+      {with("settle-seconds = 7", "settle-seconds = 604801"), "orders.settle-seconds"},
+      {with("poll-seconds = 8", "poll-seconds = 604801"), "orders.poll-seconds"},
       {with("https://pacs", "ftp://pacs"), "pacs[0].dicomweb"},
       {with("user = \"isomesh\"", ""), "password-file"},
       {with("\"stow\"", "\"fax\""), "pacs[0].send-by"},
@@ -142,6 +144,8 @@ TEST(HospitalSettings, NamesWhatIsWrong) {
       {std::string(kWhole) + "[audit]\nsyslog = \"udp://h\"\n", "audit.syslog"},
       {std::string(kWhole) + "[audit]\nsyslog = \"tls://h:0\"\n", "audit.syslog"},
       {std::string(kWhole) + "[audit]\nsyslog = \"tls://:6514\"\n", "audit.syslog"},
+      {std::string(kWhole) + "[audit]\nsyslog = \"tls://[::1\"\n", "audit.syslog"},
+      {std::string(kWhole) + "[audit]\nsyslog = \"tls://[::1]6514\"\n", "audit.syslog"},
       {std::string(kWhole) + "[audit]\nsyslog = \"tls://h\"\nkey-file = \"k\"\n", "key-file"},
       {std::string(kWhole) + "[dimse]\ncalling = [\"A\"]\nroutes = { B = \"bone\" }\n",
        "dimse.listen: is required"},
@@ -234,6 +238,19 @@ key-file = "/etc/isomesh/key.pem"
   EXPECT_EQ(hospital.syslog->ca_file, "/etc/isomesh/ca.pem");
   EXPECT_EQ(hospital.syslog->certificate_file, "/etc/isomesh/cert.pem");
   EXPECT_EQ(hospital.syslog->key_file, "/etc/isomesh/key.pem");
+}
+
+// The brackets of a URL are no part of the address to connect to.
+TEST(HospitalSettings, HaveTheAddressOfACollector) {
+  for (const auto& [url, host, port] : {std::tuple("collector", "collector", 6514),
+                                        {"10.0.0.5:7000", "10.0.0.5", 7000},
+                                        {"[fd00::5]", "fd00::5", 6514},
+                                        {"[fd00::5]:7000", "fd00::5", 7000}}) {
+    const HospitalSettings hospital =
+        parse_settings(std::string(kWhole) + "[audit]\nsyslog = \"tls://" + url + "\"\n");
+    EXPECT_EQ(hospital.syslog->host, host) << url;
+    EXPECT_EQ(hospital.syslog->port, port) << url;
+  }
 }
 
 // Secrets stand in files of their own, but who writes one into this is not to see it in a log.

@@ -50,6 +50,10 @@ class FakeWorklist : public Worklist {
     state_ = state;
     owner_ = owner;
   }
+  void set_patient(const std::string& patient_id) {
+    const Lock lock(mutex_);
+    patient_id_ = patient_id;
+  }
   std::string state() {
     const Lock lock(mutex_);
     return state_;
@@ -72,6 +76,7 @@ class FakeWorklist : public Worklist {
     return {.uid = uid_,
             .state = state_,
             .readiness = "READY",
+            .patient_id = patient_id_,
             .study = kStudy,
             .series = kSeries,
             .procedures = {"READ^99X^Read", "MESH^99X^Mesh"}};
@@ -85,6 +90,7 @@ class FakeWorklist : public Worklist {
 
   Mutex mutex_;
   std::string uid_ ISOMESH_GUARDED_BY(mutex_);
+  std::string patient_id_ ISOMESH_GUARDED_BY(mutex_) = "PAT-1";
   std::string state_ ISOMESH_GUARDED_BY(mutex_);
   std::string owner_ ISOMESH_GUARDED_BY(mutex_);
   std::string last_update_ ISOMESH_GUARDED_BY(mutex_);
@@ -138,6 +144,21 @@ TEST_F(WorkitemTest, IsPerformedAndNamesItsObject) {
             get(id).results.front().sop_instance_uid);
   EXPECT_EQ(performed.at("00404019").at("Value").at(0).at("00080100").at("Value").at(0), "MESH");
   EXPECT_THAT(to_json(get(id)), testing::Not(HasSubstr("transaction")));
+}
+
+// A code value has 16 bytes here, and the last one is within a character.
+TEST_F(WorkitemTest, IsCompletedByAStationWithALongName) {
+  settings_.station_name = "Radiologie vor \u00d6hringen";
+  list_->schedule("1.9.1");
+  const std::string id = taken();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(ends(id));
+  EXPECT_EQ(get(id).state, OrderState::kSucceeded);
+  const auto changes = nlohmann::json::parse(list_->last_update());
+  const auto performed = changes.at("00741216").at("Value").at(0);
+  const auto station = performed.at("00404028").at("Value").at(0);
+  EXPECT_EQ(station.at("00080100").at("Value").at(0), "Radiologie vor ");
+  EXPECT_EQ(station.at("00080104").at("Value").at(0), settings_.station_name);
 }
 
 // Each request takes effect, but its response is lost, and another process goes on.
@@ -198,6 +219,26 @@ TEST_F(WorkitemTest, IsCanceledWhenItsOrderFails) {
   EXPECT_THAT(get(id).error->detail, HasSubstr("the surface is empty"));
   EXPECT_EQ(list_->state(), "CANCELED");
   EXPECT_THAT(list_->last_update(), testing::Not(HasSubstr("surface")));
+}
+
+TEST_F(WorkitemTest, OfAnotherPatientThanItsImagesIsCanceled) {
+  list_->set_patient("PAT-2");
+  list_->schedule("1.9.1");
+  const std::string id = taken();
+  ASSERT_TRUE(ends(id));
+  EXPECT_EQ(get(id).state, OrderState::kFailed);
+  EXPECT_THAT(get(id).error->detail, HasSubstr("another Patient ID than the workitem"));
+  EXPECT_EQ(list_->state(), "CANCELED");
+  EXPECT_EQ(main_->stores, 0);
+}
+
+TEST_F(WorkitemTest, WithoutAPatientIsPerformed) {
+  list_->set_patient("");
+  list_->schedule("1.9.1");
+  const std::string id = taken();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(ends(id));
+  EXPECT_EQ(get(id).state, OrderState::kSucceeded);
 }
 
 TEST_F(WorkitemTest, ThatTheWorklistEndsCancelsItsOrder) {

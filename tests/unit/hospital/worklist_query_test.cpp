@@ -21,6 +21,9 @@ TEST(WorklistQuery, MatchesByKindOfValue) {
            {"00741000", ""},
            {"PatientID", "PAT-1"},
            {"PatientID", "PAT*"},
+           {"PatientID", "*"},
+           {"AdmissionID", "*"},
+           {"AdmissionID", ""},
            {"PatientName", "doe^*"},
            {"StudyInstanceUID", "1.6,1.7"},
            {"0020000d", "1.7\\1.8"},
@@ -39,12 +42,14 @@ TEST(WorklistQuery, MatchesByKindOfValue) {
   for (const auto& [name, value] : {
            std::pair<std::string, std::string>{"ProcedureStepState", "COMPLETED"},
            {"PatientID", "PAT"},
+           {"PatientID", "pat-1"},
+           {"PatientID", "pat*"},
+           {"AdmissionID", "A*"},
            {"PatientName", "Roe*"},
            {"StudyInstanceUID", "1.77"},
            {"ScheduledWorkitemCodeSequence.CodeValue", "READ"},
            {"ScheduledWorkitemCodeSequence", "MESH"},
            {"PatientID.CodeValue", "PAT-1"},
-           {"AdmissionID", "*"},
            {"ScheduledProcedureStepStartDateTime", "20260103-"},
            {"ScheduledProcedureStepStartDateTime", "-2025"},
            {"ScheduledProcedureStepStartDateTime", "20250101-20251231"},
@@ -63,9 +68,27 @@ TEST(WorklistQuery, ComparesMomentsOfAllZones) {
   EXPECT_TRUE(finds("20260102230000-0500", "20260103040000+0000"));
   EXPECT_TRUE(finds("20260102230000-0500", "20260103053000+0130"));
   EXPECT_TRUE(finds("20260102230000-0500", "2026010304+0000-"));
+  EXPECT_TRUE(finds("20260102230000-0500", "20260103033000 0000-20260103043000 0000"));
   EXPECT_TRUE(finds("20260103003015.5+0100", "-20260102233015.5+0000"));
+  EXPECT_TRUE(finds("20260102230000-0500", "20260101000000+0000-99991231235959+0000"));
+  EXPECT_TRUE(finds("99991231235959-0500", "20260101000000+0000-"));
   EXPECT_FALSE(finds("20260102230000-0500", "20260102230000+0000"));
   EXPECT_FALSE(finds("20260102230000-0500", "-20260103035900+0000"));
+}
+
+// "0800-1200" is a range, although "-1200" could be the zone of a DT.
+TEST(WorklistQuery, HasRangesOfTimes) {
+  DataSet data = data_of(test::new_record());
+  const auto finds = [&](const std::string& time, const std::string& wanted) {
+    data["00100032"] = attribute("TM", time);
+    return matches(parse_query({{"00100032", wanted}}), data);
+  };
+  for (const char* wanted : {"0800-1200", "10-1030", "1000-", "-1100", "101500", "0930-1015"}) {
+    EXPECT_TRUE(finds("101500", wanted)) << wanted;
+  }
+  for (const char* wanted : {"0800-1000", "1100-1400", "1030-", "-1000", "101501", "0930-1014"}) {
+    EXPECT_FALSE(finds("101500", wanted)) << wanted;
+  }
 }
 
 TEST(WorklistQuery, KnowsWhatItDoesNotSearchFor) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
+#include "tests/support/flips.h"
 #include "tests/unit/hospital/worklist.h"
 
 namespace isomesh::worklist {
@@ -48,6 +49,14 @@ std::string refusal_of(const std::function<void()>& act) {
            (error.fields().empty() ? "" : ' ' + error.fields().front().field);
   }
   return "accepted";
+}
+
+TEST(WorklistRules, ARecordWithAWrongByteIsNoOther) {
+  test::expect_wrong_bytes_found(claimed().data, [](const std::string& data) {
+    WorkitemRecord record = claimed();
+    record.data = data;
+    return data_of(record);
+  });
 }
 
 TEST(WorklistRules, ANewWorkitemHasItsUidAndNoSecret) {

@@ -30,6 +30,7 @@ Guarded guard(const Thrown& thrown, bool is_folder_away = false) {
   Guarded result;
   Request request;
   request.path = "/v1/jobs/1/mesh.obj";
+  request.context.route = "/v1/jobs/{id}/mesh.{format}";
   start_log(LogFormat::kText, LogLevel::kInfo);
   testing::internal::CaptureStderr();
   guarded(folder, request, result.response, [&]() -> std::optional<Continuation> { throw thrown; });
@@ -43,6 +44,13 @@ TEST(GuardedRequest, HidesTheReasonOfItsOwnFailure) {
   EXPECT_EQ(response.status, 500);
   EXPECT_THAT(response.body, Not(HasSubstr("the secret")));
   EXPECT_THAT(log, HasSubstr("the secret"));
+}
+
+// A path is the client's.
+TEST(GuardedRequest, IsLoggedWithItsRoute) {
+  const auto [response, log] = guard(Error(ErrorCode::kInternal, "the reason"));
+  EXPECT_THAT(log, HasSubstr("/v1/jobs/{id}/mesh.{format} failed"));
+  EXPECT_THAT(log, Not(HasSubstr("/v1/jobs/1")));
 }
 
 TEST(GuardedRequest, IsToComeAgainWhileTheDataFolderIsMissing) {

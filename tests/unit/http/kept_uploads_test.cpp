@@ -161,10 +161,11 @@ TEST_F(KeptParts, ThoseThatHaveBecomeVolumesTakeNoPlaceOfOthers) {
     const KeptUploads::Partial upload = begun(kept, "a", 10);
     upload->complete(*upload->begin_lease(10));
     last = upload->name();
-    kept.finish("a", last, "{}");
+    kept.finish("a", last, "{}", {{"volume", "1"}});
   }
   EXPECT_NO_THROW(kept.find_partial("a", waiting));
-  EXPECT_EQ(kept.became("a", last), "{}");
+  EXPECT_EQ(kept.partial_of("a", last)->note().volume, "{}");
+  EXPECT_EQ(kept.partial_of("a", last)->note().read_with, (Parameters{{"volume", "1"}}));
   begun(kept, "a");
   EXPECT_TRUE(eventually([&] { return files() <= 2 * 2 + 4; }));  // theirs are notes alone
 }

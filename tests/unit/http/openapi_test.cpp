@@ -1,4 +1,5 @@
 // The public description has every route of the server and no other.
+#include <cstddef>
 #include <set>
 #include <string>
 
@@ -28,6 +29,7 @@ class OpenApi : public testing::Test {
     add_inspect_routes(app_);
     add_page_routes(app_);
     add_service_routes(app_);
+    own_routes_ = app_.router.routes().size();
 #ifdef ISOMESH_HOSPITAL
     hospital::add_order_routes(app_, nullptr);
     hospital::add_worklist_routes(app_, nullptr);
@@ -53,6 +55,7 @@ class OpenApi : public testing::Test {
 
   OpenServices services_;
   App app_{services_.all(), ServerOptions{}};
+  std::size_t own_routes_ = 0;  // the others are a wing's
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
 };
 
@@ -62,6 +65,19 @@ TEST_F(OpenApi, DescribesEveryRouteWithItsMethods) {
     const YAML::Node path = description_["paths"][route.pattern()];
     ASSERT_TRUE(path) << route.pattern();
     EXPECT_EQ(methods_of(path), methods_of(route)) << route.pattern();
+  }
+}
+
+// Load balancers tell them apart (docs/cluster.md).
+TEST_F(OpenApi, TagsTheRoutesThatOneDaemonHas) {
+  for (std::size_t n = 0; n < app_.router.routes().size(); ++n) {
+    const std::string& pattern = app_.router.routes()[n].pattern();
+    if (pattern.starts_with("/assets/")) continue;
+    for (const auto& operation : description_["paths"][pattern]) {
+      if (!operation.second.IsMap() || !operation.second["tags"]) continue;
+      EXPECT_EQ(operation.second["tags"][0].as<std::string>() == "orders", n >= own_routes_)
+          << pattern;
+    }
   }
 }
 

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/clock.h"
 #include "tests/support/errors.h"
 #include "tests/unit/http/requests.h"
 
@@ -34,6 +35,37 @@ TEST(AcceptsGzip, IsWhatTheHeaderSays) {
     EXPECT_FALSE(accepts_gzip(with_header("Accept-Encoding", header))) << header;
   }
   EXPECT_FALSE(accepts_gzip(Request()));
+}
+
+// --- Times
+
+TEST(Instant, OutsideOfTheClockIsTheNearestThatItHas) {
+  const auto instant = [](const std::string& text) {
+    return timestamp_of(instant_of(with_query({{"until", text}}), "until").value());
+  };
+  EXPECT_EQ(instant("2026-11-20"), "2026-11-20T00:00:00.000Z");
+  EXPECT_EQ(instant("2024-02-29T23:59:59Z"), "2024-02-29T23:59:59.000Z");
+  EXPECT_EQ(instant("2261-12-31T23:59:59.999Z"), "2261-12-31T23:59:59.999Z");
+  EXPECT_EQ(instant("1970-01-01"), "1970-01-01T00:00:00.000Z");
+  for (const char* late : {"2262-01-01", "2300-02-28T12:00:00Z", "9999-12-31"}) {
+    EXPECT_EQ(instant(late), "2261-12-31T23:59:59.999Z") << late;
+  }
+  for (const char* early : {"1969-12-31T23:59:59Z", "1900-01-01", "0001-01-01"}) {
+    EXPECT_EQ(instant(early), "1970-01-01T00:00:00.000Z") << early;
+  }
+}
+
+TEST(Instant, IsATimeThatThereIs) {
+  for (const char* wrong :
+       {"", "yesterday", "2026-02-30", "2023-02-29", "9999-13-01", "9999-12-32", "2026-00-10",
+        "2026-11-20T24:00:00Z", "2026-11-20T12:60:00Z", "2026-11-20T12:00:60Z",
+        "2026-11-20T07:30:00", "2026-11-20 07:30:00Z", "2026-11-20T07:30:00+01:00", "+026-11-20"}) {
+    EXPECT_EQ(code_thrown_by([&] {
+                instant_of(with_query({{"until", wrong}}), "until");
+              }),
+              ErrorCode::kInvalidParameter)
+        << wrong;
+  }
 }
 
 // --- Waiting

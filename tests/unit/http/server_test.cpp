@@ -55,6 +55,19 @@ TEST(Server, OrdersEndBeforeItIfTheStartFailsLater) {
   EXPECT_FALSE(orders.has_listener());
 }
 
+// Rates need a first sample.
+TEST(Server, CountsTheFailuresOfAllRoutesFromTheStart) {
+  OpenServices services;
+  const Server server(services.all(), ServerOptions{});
+  const std::string text = services.all().metrics.text({}, MetricsFormat::kOpenMetrics);
+  for (const auto& [method, route] : {std::pair("POST", "/v1/jobs"), std::pair("HEAD", "/livez"),
+                                      std::pair("POST", "none"), std::pair("other", "none")}) {
+    EXPECT_THAT(text,
+                testing::HasSubstr("\nisomesh_http_requests_total{method=\"" + std::string(method) +
+                                   "\",route=\"" + route + "\",status=\"5xx\"} 0\n"));
+  }
+}
+
 std::string add_job(OpenServices& services, double iso = 1) {
   services.volumes().add("", Volume{});
   JobParameters parameters;

@@ -49,6 +49,14 @@ class OpenServices {
   store::SqlVolumeStore& volumes() { return volumes_; }
   LateJobStore& jobs() { return jobs_; }
   store::AuditTrail& audit() { return audit_; }
+  store::SqlDatabase& database() { return database_; }
+  void damage_volume(const std::string& id) {
+    database_.change(store::Change::kNew, [&](store::SqlTransaction& transaction) {
+      transaction.connection().run("UPDATE volumes SET record = '#' WHERE id = ?1", id);
+      transaction.commit();
+      return 0;
+    });
+  }
   Services all(Wing* wing = nullptr) {
     return {.folder = data_,
             .blobs = blobs_,

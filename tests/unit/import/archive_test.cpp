@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iomanip>
 #include <sstream>
 
@@ -83,6 +84,33 @@ TEST(Archive, NamesMayBeDeclaredAsUtf8) {
   for (const Utf8Names names : {Utf8Names::kFlag, Utf8Names::kField}) {
     const Outcome outcome = imported(import_bytes(zip_in_utf8(members, names)));
     EXPECT_EQ(outcome.volume.name, "R\xc3\xbcmpf.mhd");
+  }
+}
+
+// Windows writes names into a ZIP in the PC's old set, and headers in Latin-1, as old TARs do.
+TEST(Archive, NamesInOldEncodingsAreRead) {
+  const std::string header =
+      mhd("Sch\xe4"
+          "del.raw");
+  std::string zipped =
+      zip({{"Sch@del.mhd", header}, {"Sch@del.raw", kSamples}, {"b.nii", nifti({}, kSamples)}});
+  std::ranges::replace(zipped, '@', '\x84');
+  const std::string tarred = tar({{"Sch\xe4"
+                                   "del.mhd",
+                                   header},
+                                  {"Sch\xe4"
+                                   "del.raw",
+                                   kSamples},
+                                  {"b.nii", nifti({}, kSamples)}});
+  for (const std::string& archive : {zipped, tarred}) {
+    const Outcome several = import_bytes(archive);
+    ASSERT_EQ(several.remedy.choices.size(), 2) << several.error;
+    EXPECT_EQ(several.remedy.choices[0].value,
+              "Sch\xc3\xa4"
+              "del.mhd");
+    const Outcome chosen =
+        imported(import_bytes(archive, {}, {.member = several.remedy.choices[0].value}));
+    EXPECT_EQ(chosen.volume.format, "metaimage");
   }
 }
 

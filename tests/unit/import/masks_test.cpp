@@ -100,6 +100,41 @@ TEST(Masks, OfFloatsAndOfOtherFormatsWork) {
               AllOf(HasSubstr("\"skin.nii\": "), HasSubstr("\"bone.mhd\"")));
 }
 
+std::string float_mask(const std::vector<float>& samples) {
+  const auto [code, bits] = nifti_type<float>();
+  return nifti({.datatype = code, .bitpix = bits}, bytes_of(samples));
+}
+
+// Half of a probability, and a byte of ones that is read with a sign.
+TEST(Masks, MayHaveAnyValueInside) {
+  std::vector<float> half(kMaskSamples);
+  half[5] = 0.5F;
+  const auto [code, bits] = nifti_type<std::int8_t>();
+  const std::string negative = nifti({.datatype = code, .bitpix = bits}, mask_from(9, 11, '\xff'));
+  const std::vector<float> whole(kMaskSamples, -1);
+  const Outcome all = imported(import_masks_of(
+      {{"a.nii", float_mask(half)}, {"b.nii", negative}, {"c.nii", float_mask(whole)}}));
+  std::string expected(kMaskSamples, '\3');
+  expected[5] = '\4';
+  expected[9] = expected[10] = '\5';
+  EXPECT_EQ(all.sample_bytes(), expected);
+}
+
+// Resampling leaves traces around a structure, which do not belong to it.
+TEST(Masks, OfFloatsMayBeALittleOff) {
+  std::vector<float> traces(kMaskSamples, 1e-6F);
+  traces[5] = 0.9999F;
+  traces[6] = 1;
+  const Outcome all = imported(import_masks_of({{"a.nii", float_mask(traces)}}));
+  EXPECT_EQ(all.sample_bytes(), mask_from(5, 7));
+  traces[5] = 0.9991F;
+  traces[6] = 1.0009F;
+  EXPECT_EQ(imported(import_masks_of({{"a.nii", float_mask(traces)}})).sample_bytes(),
+            mask_from(5, 7));
+  traces[7] = 0.4F;
+  EXPECT_THAT(import_masks_of({{"a.nii", float_mask(traces)}}).error, HasSubstr("not a mask"));
+}
+
 TEST(Masks, OnAnotherGridAreNamed) {
   const Member first = {"a.nii", nifti_mask(0, 8)};
   const Outcome smaller = import_masks_of(

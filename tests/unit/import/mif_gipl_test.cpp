@@ -64,7 +64,8 @@ TEST(Mif, AxesWithoutATransformAreThoseOfRas) {
   const Outcome outcome = imported(import_bytes(mif(fields, kSamples)));
   EXPECT_EQ(outcome.sample_bytes(), kSamples);
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{2, 3, 4}));
-  EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3 * 2, 0, 0}));
+  // The image is centred: without the reversal its first voxel would be at (-3,-3,-2) in RAS.
+  EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-(-3. + 3 * 2), 3, -2}));
   EXPECT_EQ(outcome.volume.geometry.direction, (Matrix{1, 0, 0, 0, -1, 0, 0, 0, 1}));
   EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
   EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("RAS"));

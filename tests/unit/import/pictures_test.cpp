@@ -98,6 +98,23 @@ TEST(Pictures, GreyPalettesAreGreyPictures) {
   }
 }
 
+TEST(Pictures, IndicesBeyondThePaletteAreTold) {
+  PictureFields grey = {.width = 3, .height = 2, .palette = {{9, 9, 9}, {200, 200, 200}}};
+  const Outcome black =
+      stack(png_picture(grey, "\0\1\5\0\1\0"s), png_picture(grey, "\0\1\0\0\7\1"s));
+  ASSERT_EQ(black.error, "");
+  EXPECT_EQ(samples_of<std::uint8_t>(black), (Bytes{9, 200, 0, 9, 200, 9, 9, 200, 9, 9, 0, 200}));
+  EXPECT_THAT(black.volume.notes.at(1).detail, HasSubstr("2 samples have an index beyond"));
+  EXPECT_EQ(black.volume.notes.at(1).code, "header-corrected");
+  const std::string second = png_picture(kLabels, "\0\0\1\0\0\2"s);
+  const Outcome labels = stack(png_picture(kLabels, "\0\1\1\0\2\7"s), second);
+  ASSERT_EQ(labels.error, "");
+  EXPECT_EQ(labels.sample_bytes(), "\0\1\1\0\2\7\0\0\1\0\0\2"s);
+  EXPECT_THAT(labels.volume.labels.back(), (LabelEntry{.label = 7}));
+  EXPECT_THAT(labels.volume.notes.at(1).detail, HasSubstr("1 sample has an index beyond"));
+  EXPECT_THAT(codes_of(stack(second, second)), testing::Not(testing::Contains("header-corrected")));
+}
+
 TEST(Pictures, OnlyUnsignedIntegersAreIndices) {
   const auto error = [](PictureFields fields, std::uint16_t format, std::size_t bytes) {
     fields.format = format;

@@ -64,6 +64,8 @@ TEST(Zarr, UnitsAndOrientationsPlaceIt) {
   const Outcome bare = read(R"("z", "y", "x")");
   EXPECT_THAT(codes_of(bare), Contains("unit-unknown"));
   EXPECT_EQ(bare.volume.geometry.spacing, (Vector{1, 2, 4}));
+  const Outcome placeholders = read(axis("z", "?") + "," + axis("y", "???") + "," + axis("x", "?"));
+  EXPECT_THAT(codes_of(placeholders), Contains("unit-unknown"));
   const auto turned = [](const std::string& name, const std::string& value) {
     return R"({"name": ")" + name + R"(", "type": "space", "unit": "millimeter", "orientation":
            {"type": "anatomical", "value": ")" +

@@ -56,6 +56,9 @@ TEST(Crop, LeavesTheSamplesInTheBoxWhereTheyAre) {
     const CroppedSamples cropped(array_of(samples, geometry), parameters);
     const SampleArray& array = cropped.array();
     EXPECT_EQ(array.dims, (Triple{7, 5, 5}));
+    EXPECT_EQ(cropped.bytes(), 7 * 5 * 5 * sizeof(std::uint16_t));
+    EXPECT_EQ(CroppedSamples::most_bytes(parameters, geometry, kDims, SampleType::kUint16),
+              cropped.bytes());
     const auto own_space = test::space_of(array.geometry);
     std::size_t n = 0;
     std::size_t seen = 0;
@@ -118,6 +121,19 @@ TEST(Crop, RefusesABoxWithoutSamples) {
     EXPECT_NE(std::string(error.what()).find("crop"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("from (0, 0, 0) to ("), std::string::npos);
   }
+}
+
+// The floats that were copied are not needed beside the integers that they became.
+TEST(Crop, OfFloatLabelsHoldsTheIntegersAlone) {
+  const std::vector<float> samples(std::size_t{kDims[0]} * kDims[1] * kDims[2], 3);
+  const SampleArray array = {SampleType::kFloat32, kDims, Geometry{},
+                             reinterpret_cast<const std::byte*>(samples.data())};
+  MeshParameters parameters = label_parameters({});
+  parameters.crop = Box{{{0, 0, 0}, {4, 4, 4}}};
+  const CroppedSamples cropped(array, parameters);
+  EXPECT_EQ(cropped.bytes(), 5 * 5 * 5 * sizeof(std::int32_t));
+  EXPECT_EQ(CroppedSamples::most_bytes(parameters, {}, kDims, SampleType::kFloat32),
+            5 * 5 * 5 * (sizeof(std::int32_t) + sizeof(float)));
 }
 
 }  // namespace

@@ -123,6 +123,16 @@ TEST_F(EstimateTest, IsOfTheBoxThatAJobIsCroppedTo) {
   EXPECT_NE(exact(parameters).triangles, whole);
 }
 
+// The samples in the box are copied, and the copy is not mapped from a file as the volume is.
+TEST_F(EstimateTest, IsOfTheCopyOfTheBoxToo) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  const std::uint64_t whole = estimator_.estimate("", parameters).memory_bytes;
+  parameters.crop = Box{{{-1e3, -1e3, -1e3}, {1e3, 1e3, 1e3}}};
+  EXPECT_EQ(estimator_.estimate("", parameters).memory_bytes,
+            whole + volume.sample_count() * bytes_per_sample(volume.type));
+}
+
 TEST_F(EstimateTest, OfFewerTrianglesSaysAboutHowMany) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);
@@ -171,6 +181,42 @@ TEST_F(EstimateTest, RefusesWhatIsNotThereOrHasStopped) {
   const Volume volume = add_sphere();
   estimator_.stop();
   EXPECT_TRUE(test::code_thrown_by([&] { estimator_.estimate("", parameters_of(volume, 0)); }));
+}
+
+// The model learns from jobs on them.
+TEST_F(EstimateTest, VolumesThatAreDamagedOrGoneSpoilNoOthers) {
+  const auto ball = [](double radius) {
+    return test::sample<std::uint8_t>(test::scaled(test::sphere({5.5, 5.5, 5.5}, radius), 20, 100),
+                                      {12, 12, 12});
+  };
+  const Volume gone = add(ball(3), SampleType::kUint8);
+  const Volume damaged = add(ball(4), SampleType::kUint8);
+  const JobParameters parameters = parameters_of(add(ball(5), SampleType::kUint8), 100);
+  for (const Volume& volume : {gone, damaged}) EXPECT_TRUE(run(parameters_of(volume, 100)).mesh);
+  const Estimate before = estimator_.estimate("", parameters);
+  database_.change(store::Change::kNew, [&](store::SqlTransaction& transaction) {
+    transaction.connection().run("UPDATE volumes SET record = '#' WHERE id = ?1", damaged.id);
+    transaction.commit();
+    return 0;
+  });
+  // Its record is still there when the volumes of the jobs are looked up.
+  class Erasing : public store::SqlVolumeStore {
+   public:
+    Erasing(store::SqlDatabase& database, std::string id)
+        : SqlVolumeStore(database), id_(std::move(id)) {}
+    Volume get(const store::Viewer& viewer, const std::string& id) const override {
+      if (id == id_) throw Error(ErrorCode::kGone, "the volume has expired");
+      return SqlVolumeStore::get(viewer, id);
+    }
+
+   private:
+    const std::string id_;
+  };
+  const Erasing volumes(database_, gone.id);
+  Estimator estimator(volumes, blobs_, jobs_, {.memory_bytes = 4 << 20}, job_program());
+  const Estimate after = estimator.estimate("", parameters);
+  EXPECT_EQ(after.triangles, before.triangles);
+  EXPECT_NE(after.milliseconds, before.milliseconds) << "nothing was learnt before";
 }
 
 // Whatever it does to the process that counts.

@@ -1,5 +1,6 @@
 // Jobs by labels, from stored samples to stored files.
 #include <cmath>
+#include <map>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -10,8 +11,11 @@
 #include "server/jobs/library/complete_labels.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/label_pages.h"
+#include "server/jobs/library/label_samples.h"
+#include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/queue/estimate.h"
 #include "server/jobs/queue/pipeline.h"
+#include "server/store/job_rules.h"
 #include "tests/support/errors.h"
 #include "tests/support/step.h"
 #include "tests/unit/jobs/fixture.h"
@@ -155,7 +159,7 @@ TEST_F(LabelJobsTest, AreSettledByWhatTheVolumeSays) {
   const JobParameters all = settled(volume, parameters);
   EXPECT_EQ(all.label_names, (LabelTexts{{5, "Both"}, {9, "Mine"}}));
   EXPECT_FALSE(all.max_displacement_mm);
-  EXPECT_EQ(all.label_values, (LabelValues{{5, {3, 7}}}));
+  EXPECT_TRUE(all.label_values.empty());
 
   parameters.smoothing = Smoothing::kLaplacian;
   EXPECT_EQ(settled(volume, parameters).max_displacement_mm, 0.25);
@@ -180,6 +184,105 @@ TEST_F(LabelJobsTest, ThatOverlapAreMadeWhole) {
     EXPECT_NEAR(label.volume_mm3, label.voxels_mm3, 0.05 * label.voxels_mm3);
   }
   EXPECT_NEAR(mesh.volume_mm3.smoothed, mesh.labels[0].volume_mm3, 1e-6 * mesh.volume_mm3.smoothed);
+}
+
+// The number of voxels of each label of a job.
+std::map<std::int64_t, std::uint64_t> voxels_of(const MeshSummary& mesh) {
+  std::map<std::int64_t, std::uint64_t> voxels;
+  for (const LabelSummary& label : mesh.labels) voxels[label.label] = label.voxels;
+  return voxels;
+}
+
+// Labels of 64 bits were numbered from 1, but requests do not know that.
+TEST_F(LabelJobsTest, JoinLabelsThatTheListsOfTheVolumeHave) {
+  const std::int64_t wide = std::int64_t{1} << 60;
+  Volume volume = add_labels();
+  volume.labels = {
+      {.label = 3, .values = {7}}, {.label = 7, .values = {9}}, {.label = wide, .values = {3}}};
+  const auto own = voxels_of(run(volume, settled(volume, label_parameters({}))).mesh);
+  ASSERT_EQ(own.size(), 3U);
+  const auto joined = [&](const LabelValues& lists, const LabelChoice& labels) {
+    JobParameters parameters = label_parameters(labels);
+    parameters.label_values = lists;
+    const JobParameters once = settled(volume, parameters);
+    EXPECT_EQ(settled(volume, once), once);  // as a page sends it again
+    return voxels_of(run(volume, once).mesh);
+  };
+  using Voxels = std::map<std::int64_t, std::uint64_t>;
+  EXPECT_EQ(joined({{50, {3}}}, {{50}}), (Voxels{{50, own.at(3)}}));
+  EXPECT_EQ(joined({{50, {3, wide}}}, {}),
+            (Voxels{{7, own.at(7)}, {50, own.at(3) + own.at(wide)}}));
+  EXPECT_EQ(joined({{3, {7}}}, {}), (Voxels{{3, own.at(7)}, {wide, own.at(wide)}}));
+  EXPECT_EQ(joined({{50, {9}}}, {}), own);  // a number of samples, but no label
+}
+
+// Version 8 completed each job by the samples of its labels.
+TEST_F(LabelJobsTest, OfAnOlderVersionHaveTheirSamplesInTheirLists) {
+  Volume volume = add_labels();
+  volume.labels = {{.label = 1, .values = {1, 3}}, {.label = 2, .values = {3}}};
+  JobParameters parameters = label_parameters({});
+  const LabelValues own = with_label_samples(parameters, volume).label_values;
+  ASSERT_EQ(own, (LabelValues{{1, {1, 3}}, {2, {3}}}));
+  parameters.label_values = own;
+  EXPECT_EQ(with_label_samples(parameters, volume).label_values, own);
+  parameters.label_values = {{1, {1, 3}}, {2, {3}}, {50, {1}}};  // one that the request had
+  EXPECT_EQ(with_label_samples(parameters, volume).label_values, parameters.label_values);
+  parameters.labels = LabelChoice{{2}};
+  parameters.label_values = {{2, {3}}};
+  EXPECT_EQ(with_label_samples(parameters, volume).label_values, parameters.label_values);
+}
+
+TEST_F(LabelJobsTest, JoinSegmentsWithTheirOverlap) {
+  Volume volume = add_labels();
+  volume.labels = {{.label = 1, .values = {3, 7}}, {.label = 2, .values = {7, 9}}};
+  const auto own = voxels_of(run(volume, settled(volume, label_parameters({}))).mesh);
+  std::uint64_t all = 0;
+  const auto counts = lists_.counts("", volume);
+  for (const mesh::LabelVoxels& value : *counts) all += value.label == 0 ? 0 : value.voxels;
+  ASSERT_LT(all, own.at(1) + own.at(2));
+  JobParameters parameters = label_parameters({});
+  parameters.label_values = {{50, {1, 2}}};
+  const auto joined = voxels_of(run(volume, settled(volume, parameters)).mesh);
+  EXPECT_EQ(joined, (std::map<std::int64_t, std::uint64_t>{{50, all}}));
+
+  // 7 is the number of the overlap. As a background, it would take that from both.
+  parameters.label_values.clear();
+  parameters.background = 7;
+  EXPECT_EQ(test::code_thrown_by([&] { settled(volume, parameters); }),
+            ErrorCode::kInvalidParameter);
+  EXPECT_EQ(test::code_thrown_by([&] { lists_.of("", volume, 7); }), ErrorCode::kInvalidParameter);
+}
+
+// Their samples are the same, and so are the requests.
+TEST_F(LabelJobsTest, OfOtherTablesShareNoResult) {
+  Volume volume = add_labels();
+  volume.labels = {{.label = 1, .values = {3, 7}}};
+  const JobParameters parameters = settled(volume, label_parameters({}));
+  const std::string key = store::result_key(volume, parameters, "1");
+  volume.labels[0].values = {3};
+  EXPECT_NE(store::result_key(volume, settled(volume, label_parameters({})), "1"), key);
+}
+
+// Each has a surface of its own, of the same walls.
+TEST_F(LabelJobsTest, ThatOverlapTakeTheMemoryOfAllTheirSurfaces) {
+  const mesh::SurfaceSize walls = {.triangles = 1'000'000, .vertices = 500'000};
+  const JobParameters parameters = label_parameters({});
+  const std::uint64_t usual = estimate_memory(walls, 0, parameters, {});
+  EXPECT_EQ(estimate_memory(walls, 0, parameters, {}, 2 * walls.triangles), usual);
+  EXPECT_GT(estimate_memory(walls, 0, parameters, {}, 60 * walls.triangles),
+            58 * walls.triangles * (sizeof(mesh::Triangle) + sizeof(mesh::Vec3) / 2));
+
+  Volume volume = add_labels();
+  volume.labels.clear();
+  for (std::int64_t n = 1; n <= 60; ++n) volume.labels.push_back({.label = n, .values = {3, 7}});
+  JobParameters some = settled(volume, label_parameters({}));
+  some.formats = {MeshFormat::kGlb};
+  const PipelineLimits limits = {.memory_bytes = std::uint64_t{3} << 20};
+  EXPECT_EQ(test::code_thrown_by(
+                [&] { run_pipeline(volume, some, limits, blobs_, process_, {}, kQuiet); }),
+            ErrorCode::kTooLarge);
+  some.labels = LabelChoice{{1}};
+  run_pipeline(volume, some, limits, blobs_, process_, {}, kQuiet);
 }
 
 TEST_F(LabelJobsTest, AreRefusedWithTheReason) {

@@ -215,6 +215,29 @@ TEST(Layers, OneFileOfTheProductParsesJson) {
   EXPECT_EQ(users, std::vector<std::string>{"proto/json_text.h"});
 }
 
+// It replaces control characters, which a server could send to the terminal. The others write
+// meshes, their own bars and lines, and JSON for a program.
+TEST(Layers, TheConsoleOfTheCommandWritesItsTexts) {
+  const fs::path root = ISOMESH_SOURCE_DIR;
+  std::vector<std::string> writers;
+  for (const std::string top : {"client/cli", "client/mcp", "server/hospital/command"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      std::ifstream file(entry.path());
+      const std::string text(std::istreambuf_iterator<char>(file), {});
+      for (const std::string_view name : {"std::cout", "std::cerr", "std::clog", "printf(stdout",
+                                          "printf(stderr", "std::puts", "std::fputs"}) {
+        if (text.find(name) == std::string::npos) continue;
+        writers.push_back(fs::relative(entry.path(), root));
+        break;
+      }
+    }
+  }
+  std::ranges::sort(writers);
+  EXPECT_EQ(writers,
+            (std::vector<std::string>{"client/cli/console.cpp", "client/cli/downloads.cpp",
+                                      "client/cli/progress_bar.cpp", "client/mcp/server.cpp"}));
+}
+
 // So that it can be left out: see ISOMESH_HOSPITAL.
 TEST(Layers, OneFileOfTheDaemonAndOneOfTheCommandKnowTheHospital) {
   std::vector<std::string> users;

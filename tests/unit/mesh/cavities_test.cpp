@@ -11,6 +11,7 @@
 #include "server/mesh/topology/topology.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
+#include "tests/support/heap.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
@@ -158,6 +159,16 @@ TEST(Cavities, AreTheSameOnAnyNumberOfThreads) {
     return mesh;
   };
   test::expect_same_on_any_threads(make, test::kSameBytes);
+}
+
+TEST(Cavities, TakeNoMoreMemoryThanTheirBound) {
+  const auto volume = test::noise<std::uint8_t>({9, 9, 9, 9, 9, 9, 9, 0}, {40, 40, 40}, 7);
+  Mesh mesh = test::extracted(volume, {.iso = 5, .close = true});
+  const std::uint64_t bound = filling_memory(mesh.positions.size(), mesh.triangles.size());
+  test::HeapPeak peak;
+  const Dropped dropped = fill_cavities({}, mesh);
+  EXPECT_LE(peak.bytes(), bound);
+  EXPECT_GT(dropped.triangles, mesh.triangles.size());
 }
 
 TEST(Cavities, OfNothingAreNone) {

@@ -59,6 +59,24 @@ TEST(Misses, OfSurfacesSideBySideDependOnTheirDistanceAlone) {
   }
 }
 
+// Of an electron micrograph, in millimetres, or closer than single precision tells places apart.
+TEST(Misses, OfTheSmallestSurfacesAreFoundAsWell) {
+  const auto scaled = [](Surface surface, float scale) {
+    for (Vec3& position : surface.positions) {
+      for (float& coordinate : position) coordinate *= scale;
+    }
+    return surface;
+  };
+  for (const float scale : {1e-4F, 1e-7F, 1e-9F}) {
+    const Surface low = scaled(square(3, 0), scale);
+    const Surface high = scaled(square(7, 0.5F), scale);
+    EXPECT_TRUE(misses(low, high, 0.5001 * double{scale}).empty());
+    EXPECT_EQ(misses(low, high, 0.4999 * double{scale}).size(), low.triangles.size());
+    EXPECT_EQ(misses(low, high, 0.05 * double{scale}).size(), low.triangles.size());
+  }
+  EXPECT_EQ(misses(square(3, 0), square(7, 5e-8F), 1e-8).size(), 18U);
+}
+
 // No vertex and no centre of a triangle is far from the other surface.
 TEST(Misses, AreFoundBetweenAllThatIsMeasured) {
   const Surface flat = square(1, 0);

@@ -12,6 +12,7 @@
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
+#include "tests/support/heap.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
 
@@ -204,6 +205,68 @@ TEST(SelfIntersections, AreTheSameOnAnyNumberOfThreads) {
     const auto [pairs, triangles, places] = find_self_intersections(pierced_ball(), {});
     return std::tuple(pairs, triangles, places);
   });
+}
+
+// Triangles that lie across each other, each with corners of its own.
+Mesh tangle_of(std::size_t triangles, double extent) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> place(0, static_cast<float>(extent));
+  std::uniform_real_distribution<float> way(-1, 1);
+  std::vector<Vec3> positions;
+  std::vector<Triangle> named;
+  for (std::uint32_t t = 0; t < triangles; ++t) {
+    const Vec3 from = {place(random), place(random), place(random)};
+    for (int corner = 0; corner < 3; ++corner) {
+      positions.push_back({from[0] + way(random), from[1] + way(random), from[2] + way(random)});
+    }
+    named.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  return mesh_of(positions, named);
+}
+
+// Cells with few triangles, and crowded ones, in several slabs.
+TEST(SelfIntersections, OfCrowdsAreThoseThatAllPairsHave) {
+  constexpr std::uint32_t kTriangles = 1200;
+  for (const double extent : {1.0, 5.0, 16.0}) {
+    const Mesh mesh = tangle_of(kTriangles, extent);
+    const SurfaceView surface = mesh;
+    std::uint64_t pairs = 0;
+    std::vector<IntersectingPair> first;
+    std::vector<bool> is_named(kTriangles);
+    for (std::uint32_t a = 0; a < kTriangles; ++a) {
+      for (std::uint32_t b = a + 1; b < kTriangles; ++b) {
+        if (!intersect_each_other(surface, a, b)) continue;
+        is_named[a] = is_named[b] = true;
+        if (pairs++ < SelfIntersections::kMostPlaces) first.push_back({a, b, {}});
+      }
+    }
+    const SelfIntersections found = find_self_intersections(surface, {});
+    EXPECT_GT(pairs, SelfIntersections::kMostPlaces);
+    EXPECT_EQ(found.pairs, pairs);
+    EXPECT_EQ(found.triangles, static_cast<std::uint64_t>(std::ranges::count(is_named, true)));
+    ASSERT_EQ(found.places.size(), first.size());
+    for (std::size_t n = 0; n < first.size(); ++n) {
+      EXPECT_EQ(found.places[n].first, first[n].first);
+      EXPECT_EQ(found.places[n].second, first[n].second);
+    }
+    std::uint64_t even = 0;
+    for (std::uint32_t a = 0; a < kTriangles; a += 2) {
+      for (std::uint32_t b = a + 1; b < kTriangles; ++b)
+        even += intersect_each_other(surface, a, b);
+    }
+    const auto is_even = [](std::uint32_t one, std::uint32_t) { return one % 2 == 0; };
+    EXPECT_EQ(count_intersecting_pairs(surface, {}, is_even), even);
+  }
+}
+
+TEST(SelfIntersections, TakeNoMemoryForPairs) {
+  constexpr std::size_t kTriangles = 20'000;
+  const Mesh mesh = tangle_of(kTriangles, 7);
+  test::HeapPeak peak;
+  const SelfIntersections found = find_self_intersections(mesh, {});
+  const std::size_t bytes = peak.bytes();
+  EXPECT_GT(found.pairs, 500'000U);
+  EXPECT_LT(bytes, 200 * kTriangles);
 }
 
 TEST(SelfIntersections, OfNothingAreNone) {

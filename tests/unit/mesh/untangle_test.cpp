@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <stop_token>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
+#include "tests/support/heap.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
 
@@ -173,6 +175,37 @@ TEST(UntangleRest, IsWhatIntersectsAsExtracted) {
   EXPECT_EQ(effect.vertices, 0U);
   EXPECT_EQ(effect.max_displacement_mm, 1);
   EXPECT_EQ(mesh.positions[8], (Vec3{8, 9, 8}));
+}
+
+// Smoothing has thrown all triangles into one heap.
+TEST(UntangleMemory, IsBoundedHoweverManyTrianglesIntersect) {
+  constexpr std::uint32_t kTriangles = 2500;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> place(0, 7);
+  std::vector<Vec3> extracted;
+  std::vector<Vec3> smoothed;
+  std::vector<Triangle> triangles;
+  for (std::uint32_t t = 0; t < kTriangles; ++t) {
+    const auto x = static_cast<float>(t);
+    extracted.insert(extracted.end(), {{x, 0, 0}, {x, 1, 0}, {x, 0, 1}});
+    for (int corner = 0; corner < 3; ++corner) {
+      smoothed.push_back({place(random), place(random), place(random)});
+    }
+    triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  const std::uint64_t bound =
+      untangling_memory({.triangles = kTriangles, .vertices = 3 * kTriangles});
+  for (const bool rounds : {false, true}) {
+    Mesh mesh = test::mesh_of(smoothed, triangles);
+    UntangleOptions options = {.extracted = extracted};
+    if (rounds) options.rounding = [](const Mesh&) { return Rounding{rounded, 1.0 / 2048}; };
+    test::HeapPeak peak;
+    const UntangleEffect effect = untangle(options, {}, mesh);
+    EXPECT_LE(peak.bytes(), bound);
+    EXPECT_GT(effect.pairs, 200'000U);
+    EXPECT_EQ(effect.left, 0U);
+    EXPECT_EQ(effect.vertices, 3 * kTriangles);
+  }
 }
 
 TEST(UntangleRest, MayBeNothing) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 #include <memory>
+#include <new>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -399,6 +400,23 @@ TEST(Walk, EndsWithWhatItsUserThrows) {
       SurfaceWindows windows = windows_of(one);
       Thrower thrower(windows.count(), in);
       EXPECT_THROW(walk(windows, {one.smooth, 2, true}, {}, thrower), std::runtime_error);
+    }
+  }
+}
+
+// As a report of progress that runs out of memory: it stands between two tasks.
+TEST(Walk, EndsWithWhatItsProgressThrows) {
+  const Bytes volume = specks();
+  const Case one = {volume, {.iso = 60, .regularize = true}, {.steps = means(5, {1})}};
+  for (const int threads : {1, 2, 8}) {
+    const test::ThreadCount several(threads);
+    for (const double from : {0.0, 0.5}) {
+      SurfaceWindows windows = windows_of(one);
+      Collector collector(windows.count());
+      const Context context = {{}, [from](double done) {
+                                 if (done >= from) throw std::bad_alloc();
+                               }};
+      EXPECT_THROW(walk(windows, {one.smooth, 2, true}, context, collector), std::bad_alloc);
     }
   }
 }

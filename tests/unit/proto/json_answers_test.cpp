@@ -7,7 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/json.h"
+#include "proto/json_tree.h"
+#include "proto/record_digest.h"
 #include "tests/support/errors.h"
+#include "tests/support/flips.h"
 #include "tests/unit/proto/answers.h"
 
 namespace isomesh {
@@ -42,8 +45,10 @@ TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
 
 TEST(AnswerJson, VolumesComeBackTheSame) {
   EXPECT_EQ(volume_from_json(to_json(some_volume())), some_volume());
-  EXPECT_EQ(volume_from_json(to_json(Volume{})), Volume{});
-  const std::vector<Volume> several = {some_volume(), Volume{}, dicom_volume()};
+  Volume empty;
+  empty.id = "0";
+  EXPECT_EQ(volume_from_json(to_json(empty)), empty);
+  const std::vector<Volume> several = {some_volume(), empty, dicom_volume()};
   EXPECT_EQ(volumes_from_json(to_json(several)), several);
 }
 
@@ -65,7 +70,7 @@ TEST(AnswerJson, LabelsAreInRecordsAndInNoAnswer) {
       {"label": 2, "name": "M\u00fcller", "color": "#0080ff", "values": [2, 300]}])"));
   EXPECT_EQ(volume_from_record(to_record(volume)), volume);
   EXPECT_EQ(to_json(volume), to_json(some_volume()));
-  EXPECT_EQ(to_record(some_volume()), to_json(some_volume()));
+  EXPECT_EQ(to_full_json(some_volume()), to_json(some_volume()));
 }
 
 TEST(AnswerJson, AColorIsSixDigits) {
@@ -104,13 +109,14 @@ TEST(AnswerJson, NumbersComeBackToTheLastBit) {
 
 TEST(AnswerJson, EveryEnumeratorComesBack) {
   for (int number = 0; !to_string(SampleType{number}).empty(); ++number) {
-    Volume volume;
+    Volume volume = some_volume();
     volume.type = SampleType{number};
     EXPECT_EQ(volume_from_json(to_json(volume)), volume);
   }
   for (int state = 0; !to_string(JobState{state}).empty(); ++state) {
     for (int stage = 0; !to_string(Stage{stage}).empty(); ++stage) {
       Job job;
+      job.id = "0";
       job.state = JobState{state};
       job.stage = Stage{stage};
       EXPECT_EQ(job_from_json(to_json(job)), job);
@@ -230,16 +236,105 @@ TEST(AnswerJson, NulByteEndsNone) {
   EXPECT_EQ(code_thrown_by([&] { jobs_from_json(text + '\0' + text); }), ErrorCode::kInternal);
 }
 
-TEST(AnswerJson, NestingWithoutEndIsReadWithoutRecursion) {
-  const std::string deep =
-      "{\"later\": " + std::string(200'000, '[') + std::string(200'000, ']') + "}";
-  EXPECT_EQ(problem_from_json(deep), Problem{});
+std::string nested(std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); }
+
+TEST(AnswerJson, NestingWithoutEndIsNoJson) {
+  EXPECT_EQ(problem_from_json("{\"later\": " + nested(200) + "}"), Problem{});
+  EXPECT_EQ(problem_from_json(R"({"later": ")" + std::string(1000, '[') + R"(\"[["})"), Problem{});
+  EXPECT_EQ(code_thrown_by([] { problem_from_json("{\"later\": " + nested(200'000) + "}"); }),
+            ErrorCode::kInternal);
+}
+
+// A value is written in the error's text, or to compare it.
+TEST(RequestJson, NestingWithoutEndExhaustsNoStack) {
+  for (const std::string name : {"scheme", "iso", "passes", "smoothing", "labels", "crop", "x"}) {
+    const std::string body = R"({"volume": "a", ")" + name + "\": " + nested(500'000) + '}';
+    EXPECT_EQ(code_thrown_by([&] { parse_job_parameters(body); }), ErrorCode::kInvalidParameter)
+        << name;
+  }
+}
+
+TEST(AnswerJson, AnObjectWithAnotherIdFailsAndIsLeftOutOfAList) {
+  Volume odd = some_volume();
+  odd.id = "$(id)";
+  EXPECT_EQ(code_thrown_by([&] { volume_from_json(to_json(odd)); }), ErrorCode::kInternal);
+  EXPECT_EQ(volumes_from_json(to_json(std::vector{odd, some_volume()})),
+            std::vector{some_volume()});
+}
+
+TEST(AnswerJson, NamesOtherObjectsByTheirIds) {
+  Job odd = succeeded_job();
+  odd.parameters.volume = "a\x1b[2J";
+  EXPECT_EQ(code_thrown_by([&] { job_from_json(to_json(odd)); }), ErrorCode::kInternal);
+  EXPECT_EQ(jobs_from_json(to_json(std::vector{odd, succeeded_job()})),
+            std::vector{succeeded_job()});
+  EXPECT_EQ(code_thrown_by([] { histogram_from_json(R"({"volume": "../a"})"); }),
+            ErrorCode::kInternal);
+}
+
+// An id is a word of a shell, a part of a path and no option.
+TEST(AnswerJson, AnIdHasTheFormOfIds) {
+  for (const std::string id : {"7", "abc", "0192e4b1-77c3-7000-a000-000000000000", "A-"}) {
+    EXPECT_TRUE(is_id(id)) << id;
+  }
+  for (const std::string id : {"", "-a", "a b", "a_b", "a/b", "..", "$a", "a\n", "\u00e9"}) {
+    EXPECT_FALSE(is_id(id)) << id;
+  }
+  EXPECT_TRUE(is_id(std::string(64, 'a')));
+  EXPECT_FALSE(is_id(std::string(65, 'a')));
 }
 
 TEST(Records, AreReadBackWhole) {
   const Job job = succeeded_job();
   EXPECT_EQ(job_from_record(to_json(job)), job);
   EXPECT_EQ(job_from_record(to_json(Job{})), Job{});
+}
+
+TEST(Records, WithAWrongByteAreNoOthers) {
+  Volume labelled = dicom_volume();
+  labelled.labels = {{.label = 2, .name = "Liver", .color = "#0080ff", .values = {2, 300}}};
+  for (const Volume& volume : {some_volume(), labelled, Volume{}}) {
+    test::expect_wrong_bytes_found(to_record(volume), volume_from_record);
+  }
+  Job by_labels = succeeded_job();
+  static_cast<MeshParameters&>(by_labels.parameters) = label_parameters({{3}});
+  by_labels.parameters.label_names = {{3, "Liver"}};
+  for (const Job& job : {queued_job(), succeeded_job(), failed_job(), by_labels}) {
+    test::expect_wrong_bytes_found(to_record(job), job_from_record);
+  }
+}
+
+TEST(Records, HaveADigestThatAnswersDoNotHave) {
+  const std::string record = to_record(some_volume());
+  EXPECT_EQ(json::parse(record).erase("digest"), 1U);
+  EXPECT_EQ(without_digest(record), to_full_json(some_volume()));
+  EXPECT_EQ(without_digest("{}"), "{}");
+  std::string other = record;
+  const std::size_t at = other.find("nifti");
+  ASSERT_NE(at, std::string::npos);
+  other.replace(at, 5, "nrrd!");
+  EXPECT_EQ(code_thrown_by([&] { without_digest(other); }), ErrorCode::kInternal);
+}
+
+TEST(Records, OfAVolumeOfAnOlderVersionLackNothingThatItWrote) {
+  for (const char* name : {"format", "dims", "type", "spacing", "origin", "direction", "range",
+                           "suggested_iso", "bytes", "created"}) {
+    json record = json::parse(to_full_json(some_volume()));
+    ASSERT_EQ(record.erase(name), 1U);
+    EXPECT_EQ(code_thrown_by([&] { volume_from_record(record.dump()); }), ErrorCode::kInternal)
+        << name;
+  }
+}
+
+// Older versions know no digest, and keep each member as they find it.
+TEST(Records, ChangedByAnOlderVersionCanBeRead) {
+  JsonTree tree(to_record(queued_job()));
+  json_values::assign(json_values::member(tree.root(), "state"), to_string(JobState::kCancelled));
+  const std::string changed = dump(tree.root());
+  Job expected = queued_job();
+  expected.state = JobState::kCancelled;
+  EXPECT_EQ(job_from_record(changed), expected);
+  EXPECT_EQ(job_from_record(to_record(job_from_record(changed))), expected);
 }
 
 TEST(Records, OfAnOlderVersionHaveDefaultsForWhatItDidNotKnow) {

@@ -62,7 +62,9 @@ class Life {
     spec.record.order.finished = timestamp();
     orders_.save(spec.record, std::chrono::system_clock::now());
   }
-  std::size_t forget_orders() { return orders_.forget(identity_.now() - kKeep); }
+  std::size_t forget_orders() {
+    return orders_.forget(identity_.now() - kKeep, identity_.now() - kKeep);
+  }
 
   // Runs one round of housekeeping and returns the ids that are left.
   std::vector<std::string> kept(const std::vector<std::string>& volumes,

@@ -1,5 +1,7 @@
 // Tests of several processes that share the jobs of one database.
 #include <chrono>
+#include <set>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -148,6 +150,38 @@ TEST_F(ClusterTest, AnEventThatIsWrittenLateIsNotMissed) {
     transaction.commit();
   }
   EXPECT_THAT(told(), testing::ElementsAre(slow, quick));
+}
+
+// The slow transaction keeps node one from reading the end before the job is gone.
+TEST_F(ClusterTest, TheEndOfAJobThatIsGoneAtOnceIsHeardByTheOtherNode) {
+  const std::string erased = submit(1);
+  const std::string of_volume = submit(2);
+  const std::string expired = submit(3);
+  const std::uint64_t since = test::events_of(one().jobs, "", expired, 1).back().id;
+  Connection connection(url_, Connection::Clock::now() + std::chrono::minutes(1));
+  {
+    Transaction transaction(connection);
+    transaction->query("SELECT pg_current_xact_id()");
+    for (int n = 0; n < 3; ++n) ASSERT_TRUE(two().jobs.finish(two().claimed(), mesh()));
+    EXPECT_TRUE(two().jobs.erase("", erased, {}));
+    const auto ended = two().jobs.ended({.before = Time::max()}, Ended::kAll, 9);
+    ASSERT_THAT(ended, SizeIs(2));
+    EXPECT_THAT(two().jobs.expire(std::span(&ended.back(), 1), kAllBytes).records, SizeIs(1));
+    two().volumes.erase("", kVolume, Made::kErased, {});
+    EXPECT_EQ(ask("SELECT count(*) FROM jobs"), "0");
+    transaction.commit();
+  }
+  std::set<std::string> heard;
+  std::uint64_t last = since;
+  while (heard.size() < 3) {
+    const auto events = one().jobs.events("", "", last, kLong);
+    ASSERT_THAT(events, Not(IsEmpty()));
+    for (const Event& event : events) {
+      if (event.kind == EventKind::kDone) heard.insert(event.job);
+      last = event.id;
+    }
+  }
+  EXPECT_THAT(heard, testing::UnorderedElementsAre(erased, of_volume, expired));
 }
 
 TEST_F(ClusterTest, ACancelReachesTheRunOfAnotherNode) {

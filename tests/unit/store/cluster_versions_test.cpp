@@ -29,8 +29,8 @@ class ClusterVersionsTest : public ClusterTest {
   std::string submit_newer() { return job_of(newer().jobs.submit(spec())).id; }
   // Its value is one that the other nodes do not know, and that node does.
   void give_unknown_value(const std::string& id) {
-    ask(R"(UPDATE jobs SET record = regexp_replace(record, '"smoothing":"\w+"',)"
-        R"('"smoothing":"newer"') WHERE id = ')" +
+    ask(R"(UPDATE jobs SET record = regexp_replace(regexp_replace(record, '"smoothing":"\w+"',)"
+        R"('"smoothing":"newer"'), ', "digest":"\w+"}$', '}') WHERE id = ')" +
         id + "'");
   }
   std::string record_of(const std::string& id) {
@@ -87,6 +87,18 @@ TEST_F(ClusterVersionsTest, AnOlderNodeEndsLostRunsAndKeepsWhatItCannotRead) {
   EXPECT_EQ(one().jobs.reap(), 1U);
   EXPECT_EQ(ask("SELECT state FROM jobs"), "4");
   EXPECT_THAT(record_of(id), HasSubstr("\"smoothing\":\"newer\""));
+}
+
+TEST_F(ClusterVersionsTest, ADamagedRunOfANewerNodeKeepsNoOtherRunning) {
+  const std::string damaged = submit_newer();
+  newer().claimed();
+  ask("UPDATE jobs SET record = '#' || record");
+  const std::string id = submit(1);
+  newer().claimed();
+  end_leases();
+  EXPECT_EQ(one().jobs.reap(), 2U);
+  EXPECT_EQ(one().jobs.get("", id).state, JobState::kQueued);
+  EXPECT_EQ(one().jobs.cancel("", damaged).state, JobState::kCancelled);
 }
 
 // The key of the older version has the bytes of that version only.

@@ -9,6 +9,7 @@
 #include "tests/support/errors.h"
 #include "tests/support/stores.h"
 #include "tests/unit/store/engine.h"
+#include "tests/unit/store/wall_clock.h"
 
 namespace isomesh::store {
 namespace {
@@ -69,6 +70,53 @@ TEST_P(JobListConformance, ListsByState) {
   EXPECT_THAT(jobs().list("", {.since = soon}, "", 10), IsEmpty());
   EXPECT_EQ(jobs().list("", {.until = soon}, "", 10).size(), 3U);
   EXPECT_THAT(jobs().list("", {.until = submitted - std::chrono::minutes(1)}, "", 10), IsEmpty());
+}
+
+// A client compares them with those that jobs tell. The clock of a daemon is another one than that
+// of its database, and may be set back.
+TEST_P(JobListConformance, ListsBetweenTimesThatJobsTell) {
+  std::vector<Job> all;
+  for (const int ahead : {0, 3600, -3600}) {
+    const test::ClockSetAhead wrong{std::chrono::seconds(ahead)};
+    all.insert(all.begin(), submit());
+    for (const Job& first : all) {
+      const Time begin = time_of(first.created);
+      for (const Time end : {begin, begin + milliseconds(1), begin + std::chrono::hours(3)}) {
+        std::vector<std::string> until;
+        std::vector<std::string> between;
+        for (const Job& job : all) {
+          const Time created = time_of(job.created);
+          if (created < end) until.push_back(job.id);
+          if (begin <= created && created < end) between.push_back(job.id);
+        }
+        EXPECT_EQ(ids_of(jobs().list("", {.until = end}, "", 9)), until);
+        EXPECT_EQ(ids_of(jobs().list(std::nullopt, {.since = begin, .until = end}, "", 9)),
+                  between);
+      }
+    }
+  }
+}
+
+TEST_P(JobListConformance, ListsOfAVolumeAreThoseOfAllOwnersForAnAdministrator) {
+  const std::string mine = submit(parameters(), "").id;
+  const std::string theirs = submit(parameters(), "other").id;
+  EXPECT_THAT(ids_of(jobs().list(std::nullopt, {.volume = kVolume}, "", 10)),
+              ElementsAre(theirs, mine));
+  EXPECT_THAT(ids_of(jobs().list("other", {.volume = kVolume}, "", 10)), ElementsAre(theirs));
+}
+
+// A request's path may name them.
+TEST_P(JobListConformance, TextsThatNoDatabaseHasNameNothing) {
+  const std::string id = submit().id;
+  for (const std::string& wrong : {std::string("\xff"), id + '\0', id + std::string("\0x", 2),
+                                   "\xe2\x82" + id, std::string("\xf0\x9f\xa6\xb4")}) {
+    EXPECT_EQ(code_thrown_by([&] { jobs().get("", wrong); }), ErrorCode::kNotFound);
+    EXPECT_EQ(code_thrown_by([&] { jobs().cancel("", wrong); }), ErrorCode::kNotFound);
+    EXPECT_EQ(code_thrown_by([&] { volumes().get("", kVolume + wrong); }), ErrorCode::kNotFound);
+    EXPECT_THAT(jobs().list("", {.volume = kVolume + wrong}, "", 9), IsEmpty());
+    EXPECT_THAT(jobs().list(wrong, {}, "", 9), IsEmpty());
+  }
+  EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
 }
 
 TEST_P(JobListConformance, ACursorNeedNotNameAJob) {

@@ -52,6 +52,16 @@ class OrderConformance : public test::EngineTest {
 INSTANTIATE_TEST_SUITE_P(Engines, OrderConformance, testing::ValuesIn(test::all_engines()),
                          test::name_of);
 
+// They were postponed while the clock was ahead.
+TEST_P(OrderConformance, AreHeldUpByNoClockThatWasSetBack) {
+  const OrderRecord record = submitted();
+  EXPECT_TRUE(orders().save(record, now() + hours(1)));
+  EXPECT_THAT(due(now()), IsEmpty());
+  EXPECT_TRUE(orders().save(record, now() + std::chrono::days(40)));
+  EXPECT_THAT(due(now()), ElementsAre(record.order.id));
+  EXPECT_TRUE(orders().if_due(record.order.id, now()));
+}
+
 TEST_P(OrderConformance, AreDueAtOnceAndKept) {
   const OrderRecord record = submitted();
   restart();
@@ -282,6 +292,18 @@ TEST_P(OrderConformance, AWatchOrdersASeriesOnceForEachOfItsLengths) {
   EXPECT_TRUE(orders().submit_watched(spec(), series, kMany));
 }
 
+// Not all PACS tell how many instances a series has. The order knows it at its end.
+TEST_P(OrderConformance, AWatchOrdersASeriesOfUnknownLengthOnce) {
+  const WatchedSeries series = {.rule = "bone", .study = "1.2", .series = "1.3"};
+  const OrderSpec first = spec();
+  EXPECT_TRUE(orders().submit_watched(first, series, kMany));
+  EXPECT_FALSE(orders().submit_watched(spec(), series, kMany));
+  OrderRecord record = first.record;
+  record.order.source.instances = 30;
+  EXPECT_TRUE(end(record, OrderState::kSucceeded));
+  EXPECT_FALSE(orders().submit_watched(spec(), series, kMany));
+}
+
 TEST_P(OrderConformance, AreCounted) {
   const OrderRecord first = submitted();
   submitted();
@@ -298,7 +320,7 @@ TEST_P(OrderConformance, AreForgottenAfterTheirEnd) {
   const OrderRecord open = submitted();
   end(old, OrderState::kSucceeded, now() - hours(48));
   end(fresh, OrderState::kSucceeded);
-  EXPECT_EQ(orders().forget(now() - hours(24)), 1U);
+  EXPECT_EQ(orders().forget(now() - hours(24), now() - hours(24)), 1U);
   EXPECT_EQ(test::code_thrown_by([&] { orders().get("", old.order.id); }), ErrorCode::kNotFound);
   EXPECT_EQ(orders().get("", fresh.order.id).state, OrderState::kSucceeded);
   EXPECT_EQ(orders().get("", open.order.id).state, OrderState::kWaiting);

@@ -51,6 +51,33 @@ TEST_P(OutboxConformance, HoldsTheEndOfEveryJobThatHasACallback) {
   EXPECT_EQ(due[0].attempts, 0);
 }
 
+// As on a full disk, before the receiver could be reached.
+TEST_P(OutboxConformance, TellsOfAJobThatHasExpiredAsTheApiDid) {
+  JobParameters calling = unlike();
+  calling.callback = Callback{"https://a.example.org/x"};
+  const std::string id = submit(calling).id;
+  Outcome outcome = some_mesh();
+  outcome.mesh->labels_count = 300;
+  outcome.mesh->label_list = {9, put_blob("some mesh")};
+  ASSERT_TRUE(jobs().finish(claimed(), outcome));
+  const std::string told = to_json(jobs().get("", id));
+  const auto ended = jobs().ended({.before = now() + std::chrono::hours(1)}, Ended::kAll, 9);
+  ASSERT_EQ(jobs().expire(ended, kAllBytes).records.size(), 1U);
+  const auto due = outbox().due(now(), 9);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].body, told);
+}
+
+// It was postponed while the clock was ahead.
+TEST_P(OutboxConformance, AClockThatWasSetBackHoldsUpNone) {
+  const std::string job = end_with_callback("https://a.example.org/x");
+  const Delivery delivery = outbox().due(now(), 9).at(0);
+  outbox().postpone(delivery, now() + std::chrono::hours(1));
+  EXPECT_THAT(due(9), testing::IsEmpty());
+  outbox().postpone(delivery, now() + std::chrono::days(40));
+  EXPECT_THAT(due(9), ElementsAre(job));
+}
+
 TEST_P(OutboxConformance, ADamagedBodyHoldsUpNoOther) {
   const std::string damaged = end_with_callback("https://a.example.org/1");
   const std::string other = end_with_callback("https://b.example.org/1");

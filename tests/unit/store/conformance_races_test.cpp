@@ -186,6 +186,71 @@ TEST_P(RaceConformance, TheQueueNeverGrowsBeyondItsLimit) {
   EXPECT_EQ(jobs().list("", {}, "", 1000).size(), 50U);
 }
 
+// Accepted at the same moment by all of these clients.
+TEST_P(RaceConformance, AnOwnerNeverHasMoreThanItsShare) {
+  make({.max_queued = 80});
+  add_volume("third", kVolume);
+  const auto accepted_of = [&](const std::string& owner, Priority priority) {
+    std::atomic<int> accepted = 0;
+    std::vector<std::jthread> clients;
+    for (int client = 0; client < 8; ++client) {
+      clients.emplace_back([&, client] {
+        for (int n = 0; n < 10; ++n) {
+          JobParameters own = parameters(priority);
+          own.iso = client * 1000 + n;
+          const auto kind = jobs().submit({owner, own, "", ""}).kind;
+          if (kind == Submission::Kind::kNew) ++accepted;
+          EXPECT_TRUE(kind == Submission::Kind::kNew || kind == Submission::Kind::kOwnersShare);
+        }
+      });
+    }
+    clients.clear();
+    return accepted.load();
+  };
+  EXPECT_EQ(accepted_of("other", Priority::kStat), 5) << "half of an eighth";
+  EXPECT_EQ(accepted_of("other", Priority::kBulk), 35) << "half of all";
+  EXPECT_EQ(accepted_of("third", Priority::kStat), 3);
+  EXPECT_EQ(accepted_of("third", Priority::kRoutine), 17);
+}
+
+// Each of these clients removes what it and the others have made.
+TEST_P(RaceConformance, EqualJobsMayComeAndGo) {
+  const JobParameters same = parameters();
+  const std::string blob = put_blob("a mesh");
+  std::vector<std::jthread> clients;
+  for (int client = 0; client < 6; ++client) {
+    clients.emplace_back([&, name = "worker " + std::to_string(client)] {
+      for (int n = 0; n < 150; ++n) {
+        ASSERT_NO_THROW({
+          const std::string id = submit(same).id;
+          const auto lease = jobs().claim(name, kLongLease);
+          if (lease) jobs().finish(*lease, mesh_of({{blob, 6}}));
+          jobs().erase("", id);
+        });
+      }
+    });
+  }
+}
+
+TEST_P(RaceConformance, OneKeyIsOfOneRequest) {
+  for (int round = 0; round < 20; ++round) {
+    std::atomic<int> created = 0;
+    std::atomic<int> refused = 0;
+    std::vector<std::jthread> clients;
+    for (int client = 0; client < 8; ++client) {
+      clients.emplace_back([&, digest = "digest " + std::to_string(client)] {
+        const auto kind =
+            jobs().submit({"", parameters(), "key " + std::to_string(round), digest}).kind;
+        created += kind == Submission::Kind::kNew ? 1 : 0;
+        refused += kind == Submission::Kind::kConflict ? 1 : 0;
+      });
+    }
+    clients.clear();
+    EXPECT_EQ(created, 1);
+    EXPECT_EQ(refused, 7);
+  }
+}
+
 TEST_P(RaceConformance, TheSameKeyFromEightClientsIsOneJob) {
   for (int round = 0; round < 20; ++round) {
     const JobSpec spec = {"", parameters(), "key " + std::to_string(round), "digest"};

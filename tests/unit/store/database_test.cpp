@@ -9,12 +9,16 @@
 #include <sys/stat.h>
 
 #include "server/store/audit/trail.h"
+#include "server/store/sql/job_list.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 
 namespace isomesh::store {
 namespace {
+
+using testing::HasSubstr;
+using testing::Not;
 
 class DatabaseTest : public testing::Test {
  protected:
@@ -88,6 +92,33 @@ TEST_F(DatabaseTest, IsOpenedAgainAsItWas) {
   }
   Database again(data_);
   EXPECT_EQ(SqlVolumeStore(again).get("", "aa"), volume);
+}
+
+// Otherwise a list of few among many jobs would read all of them.
+TEST_F(DatabaseTest, ListsOfJobsReadByIndexes) {
+  Database database(data_);
+  const auto plan = [&](const Viewer& viewer, const JobFilter& filter) {
+    const JobListValues values(filter);
+    Rows rows = database.query(
+        "EXPLAIN QUERY PLAN SELECT j.record FROM jobs j " + job_list_query(viewer, filter, ""),
+        viewer, filter.state, "", 10, values.volume, values.since, values.until, values.first_id);
+    std::string text;
+    while (rows.next()) text += rows.text(3) + '\n';
+    EXPECT_THAT(text, Not(HasSubstr("TEMP B-TREE")));
+    return text;
+  };
+  const Time time = std::chrono::system_clock::now();
+  EXPECT_THAT(plan("", {}), HasSubstr("INDEX jobs_by_owner (owner=?)"));
+  EXPECT_THAT(plan("", {.volume = "v"}), HasSubstr("INDEX jobs_of_volume (owner=? AND volume=?)"));
+  EXPECT_THAT(plan({}, {.volume = "v"}), HasSubstr("INDEX jobs_on_volume (volume=?)"));
+  EXPECT_THAT(plan("", {.since = time}), HasSubstr("INDEX jobs_by_owner (owner=? AND id>?)"));
+  EXPECT_THAT(plan({}, {.since = time}), HasSubstr("SEARCH j USING PRIMARY KEY (id>?)"));
+  const std::string until = plan("", {.until = time});
+  EXPECT_THAT(until, HasSubstr("INDEX jobs_by_owner (owner=? AND id<?)"));
+  EXPECT_THAT(until, HasSubstr("SEARCH x USING COVERING INDEX jobs_by_owner (owner=?)"));
+  const std::string of_all = plan({}, {.until = time});
+  EXPECT_THAT(of_all, HasSubstr("SEARCH j USING PRIMARY KEY (id<?)"));
+  EXPECT_THAT(of_all, HasSubstr("SCAN x USING COVERING INDEX jobs_by_time"));
 }
 
 // --- Versions of tables

@@ -264,8 +264,10 @@ void MovedAway::check_is_unavailable_until_back(FileBlobStore& blobs) {
   EXPECT_EQ(code_thrown_by([&] { blobs.local(std::string(64, '0')); }), ErrorCode::kNotFound);
   const std::string log = testing::internal::GetCapturedStderr();
   start_log(LogFormat::kText, LogLevel::kOff);
-  EXPECT_THAT(log, testing::MatchesRegex("[^\n]* error [^\n]*storage[^\n]* is missing[^\n]*\n"
-                                         "[^\n]* info [^\n]*storage[^\n]* is back[^\n]*\n"));
+  const std::string name =
+      blobs.is_shared() ? "the storage of volumes and meshes" : "the data folder";
+  EXPECT_THAT(log, testing::MatchesRegex("[^\n]* error [^\n]*" + name + " is missing[^\n]*\n" +
+                                         "[^\n]* info [^\n]*" + name + " is back[^\n]*\n"));
 }
 
 TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {

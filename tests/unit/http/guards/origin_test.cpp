@@ -38,6 +38,17 @@ TEST(HostOf, TakesThePortAway) {
   }
 }
 
+// --listen and --allow-host name addresses without brackets, too.
+TEST(HostNamed, IsTheOneThatRequestsName) {
+  for (const std::string setting : {"2001:db8::5", "[2001:db8::5]", "[2001:DB8::5]:8080"}) {
+    EXPECT_EQ(host_named(setting), host_of("[2001:db8::5]:8080")) << setting;
+  }
+  EXPECT_EQ(host_named("Viewer.local:80"), "viewer.local");
+  for (const std::string none : {"", "a:b", "2001:db8::zz", "[::1"}) {
+    EXPECT_EQ(host_named(none), "") << none;
+  }
+}
+
 TEST(Host, MustBeOursWhereItIsChecked) {
   const OriginRules rules = {.cors_origins = {}, .check_host = true, .hosts = {"viewer.local"}};
   for (const std::string ours : {"localhost:8080", "127.0.0.1:1", "127.1.2.3", "[::1]:8080",

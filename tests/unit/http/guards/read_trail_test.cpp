@@ -1,15 +1,24 @@
 #include "server/http/guards/read_trail.h"
 
+#include <atomic>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/log.h"
+#include "proto/error.h"
 #include "proto/json_tree.h"
+#include "server/store/microseconds.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
 #include "tests/unit/http/services.h"
@@ -17,12 +26,50 @@
 namespace isomesh::http {
 namespace {
 
+using testing::AllOf;
+using testing::Each;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
 constexpr std::chrono::hours kLong{1};
 const std::string kSlice = "/v1/volumes/{id}/slice.png";
+
+// Takes entries, and fails after some time while it is away.
+class LeavingDatabase : public store::SqlDatabase {
+ public:
+  static constexpr std::chrono::milliseconds kTakes{300};
+
+  std::int64_t to_us(store::Time time) const override { return store::to_us(time); }
+  store::Time from_us(std::int64_t us) const override { return store::from_us(us); }
+  std::size_t most_at_once() const override { return 1; }
+
+  std::atomic<bool> is_away = false;
+  std::atomic<int> failures = 0;
+
+ private:
+  void in_transaction(store::Change /*kind*/,
+                      const std::function<void(store::SqlTransaction&)>& /*act*/) override {
+    if (!is_away) return;
+    std::this_thread::sleep_for(kTakes);
+    ++failures;
+    throw_away();
+  }
+  void while_reading(const std::function<void(store::SqlConnection&)>& /*act*/) override {
+    throw_away();
+  }
+  std::size_t tell(store::Change /*kind*/, std::string_view /*sql*/,
+                   std::span<const store::Parameter> /*parameters*/) override {
+    throw_away();
+  }
+  store::Rows ask(std::string_view /*sql*/,
+                  std::span<const store::Parameter> /*parameters*/) override {
+    throw_away();
+  }
+  [[noreturn]] static void throw_away() {
+    throw Error(ErrorCode::kUnavailable, "the database does not respond");
+  }
+};
 
 class ReadTrailTest : public testing::Test {
  protected:
@@ -77,6 +124,18 @@ class ReadTrailTest : public testing::Test {
           text + (requests == nullptr ? "-" : std::to_string(json_values::whole(*requests, 1000))));
     });
     return found;
+  }
+
+  // The number of events that all entries of this kind stand for.
+  std::uint64_t told(const std::string& event) {
+    std::uint64_t sum = 0;
+    services_.audit().read(0, [&](std::string_view line) {
+      const JsonTree tree(line);
+      if (json_values::text(*json_values::find(tree.root(), "event")) != event) return;
+      const Json* const unlisted = json_values::find(tree.root(), "unlisted");
+      sum += 1 + (unlisted == nullptr ? 0 : json_values::whole(*unlisted, 1000));
+    });
+    return sum;
   }
 
   OpenServices services_;
@@ -195,13 +254,86 @@ TEST_F(ReadTrailTest, HasWhatNeitherAVolumeNorAJobTells) {
 TEST_F(ReadTrailTest, HasOneTryOfWhatARoleDoesNotAllowASecond) {
   for (int n = 0; n < 50; ++n) note("none", "", 403, "grafana", "POST");
   note("none", "", 403, "", "POST");  // a page of another origin
-  EXPECT_THAT(entries(), ElementsAre("110113 failure grafana 192.0.2.5 permission - - - -"));
+  const std::string entry = "110113 failure grafana 192.0.2.5 permission - - - -";
+  EXPECT_EQ(entries().front(), entry);
+  trail_.reset();
+  EXPECT_THAT(entries(), AllOf(Each(entry), SizeIs(testing::Lt(50))));
+  EXPECT_EQ(told("110113"), 50U);
 }
 
 // Strangers could fill the trail otherwise.
 TEST_F(ReadTrailTest, HasOneRefusedLoginASecond) {
   for (int n = 0; n < 50; ++n) note(kSlice, "head", 401, "");
-  EXPECT_THAT(entries(), ElementsAre("110114 failure - 192.0.2.5 login - - - -"));
+  const std::string entry = "110114 failure - 192.0.2.5 login - - - -";
+  EXPECT_EQ(entries().front(), entry);
+  trail_.reset();
+  EXPECT_THAT(entries(), AllOf(Each(entry), SizeIs(testing::Lt(50))));
+  EXPECT_EQ(told("110114"), 50U);
+}
+
+// The number of the others does not wait for another one.
+TEST_F(ReadTrailTest, TellsTheNumberOfRefusedLoginsThoughNoneFollows) {
+  for (int n = 0; n < 50; ++n) note(kSlice, "head", 401, "");
+  EXPECT_TRUE(test::eventually([&] { return told("110114") == 50; }));
+}
+
+TEST_F(ReadTrailTest, NamesTheReaderOfAMeshWhoseVolumeHasADamagedRecord) {
+  services_.damage_volume("head");
+  note("/v1/jobs/{id}/mesh.{format}", job_);
+  EXPECT_THAT(entries(), ElementsAre("110104 success ann 192.0.2.5 mesh head - - 1"));
+}
+
+TEST_F(ReadTrailTest, ACountThatCannotBeEnteredKeepsNoOthers) {
+  services_.database().change(store::Change::kNew, [](store::SqlTransaction& transaction) {
+    transaction.connection().run(
+        "CREATE TRIGGER refuses BEFORE INSERT ON audit "
+        "WHEN NEW.record LIKE '%\"caller\":\"ann\"%\"requests\":2%' "
+        "BEGIN SELECT RAISE(ABORT, 'refused'); END");
+    transaction.commit();
+    return 0;
+  });
+  trail_.reset();
+  open(std::chrono::milliseconds(1000));
+  for (int n = 0; n < 3; ++n) note(kSlice, "head", 200, "ann");
+  for (int n = 0; n < 4; ++n) note(kSlice, "head", 200, "bob");
+  EXPECT_TRUE(test::eventually([&] { return entries().size() == 3; }));
+  EXPECT_EQ(entries().back(), "110104 success bob 192.0.2.5 slice head 1.2.3 PAT1 3");
+}
+
+TEST_F(ReadTrailTest, TellsHowManyRefusedLoginsItLacksAtTheEnd) {
+  LeavingDatabase database;
+  store::AuditTrail audit(database);
+  trail_.emplace(ReadTrail::Stores{audit, services_.volumes(), services_.jobs()}, kLong);
+  database.is_away = true;
+  testing::internal::CaptureStderr();
+  start_log(LogFormat::kText, LogLevel::kError);
+  for (int n = 0; n < 3; ++n) note(kSlice, "head", 401, "");
+  trail_.reset();
+  start_log(LogFormat::kText, LogLevel::kOff);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              testing::HasSubstr("lacks 0 counts of readings and 3 refused requests"));
+}
+
+TEST_F(ReadTrailTest, EndsSoonAndDelaysNoResponseWhileTheDatabaseIsAway) {
+  using Clock = std::chrono::steady_clock;
+  LeavingDatabase database;
+  store::AuditTrail audit(database);
+  trail_.emplace(ReadTrail::Stores{audit, services_.volumes(), services_.jobs()},
+                 std::chrono::milliseconds(500));
+  for (const char* slice : {"one", "another"}) {
+    SCOPED_TRACE(slice);
+    for (int reader = 0; reader < 20; ++reader) {
+      note(kSlice, "head", 200, "reader " + std::to_string(reader));
+    }
+  }
+  database.is_away = true;
+  ASSERT_TRUE(test::eventually([&] { return database.failures > 0; }));
+  const auto before_response = Clock::now();
+  note("/v1/volumes/{id}", "phantom");  // without an entry
+  EXPECT_LT(Clock::now() - before_response, LeavingDatabase::kTakes);
+  const auto before_end = Clock::now();
+  trail_.reset();
+  EXPECT_LT(Clock::now() - before_end, 5 * LeavingDatabase::kTakes);
 }
 
 }  // namespace

@@ -105,6 +105,22 @@ TEST(Metrics, TellTheLevelsAndTheProcess) {
             ContainsRegex("process_open_fds [1-9]"), ContainsRegex("process_threads [1-9]")));
 }
 
+TEST(Metrics, CountFailuresFromTheStart) {
+  Metrics metrics;
+  metrics.expect("POST", "/v1/jobs");
+  metrics.expect("", kNoRoute);
+  const std::string text = metrics.text({}, MetricsFormat::kOpenMetrics);
+  for (const ErrorDescription& error : error_descriptions()) {
+    const std::string reason = "{reason=\"" + std::string(error.name) + "\"} 0\n";
+    EXPECT_THAT(text, HasSubstr("\nisomesh_job_failures_total" + reason));
+    EXPECT_THAT(text, HasSubstr("\nisomesh_imports_refused_total" + reason));
+  }
+  const std::string requests = "\nisomesh_http_requests_total{method=\"";
+  EXPECT_THAT(text, HasSubstr(requests + "POST\",route=\"/v1/jobs\",status=\"5xx\"} 0\n"));
+  EXPECT_THAT(text, HasSubstr(requests + "other\",route=\"none\",status=\"5xx\"} 0\n"));
+  EXPECT_THAT(text, HasSubstr("\nisomesh_callback_attempts_total{result=\"given_up\"} 0\n"));
+}
+
 struct WrittenFamily {
   std::string help;
   std::string type;

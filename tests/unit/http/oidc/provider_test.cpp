@@ -265,8 +265,10 @@ TEST_F(LoginTest, ThePageLearnsHowToLogIn) {
 
 TEST_F(LoginTest, WhatLastsEndsWithTheToken) {
   http::Request request;
+  request.path = "/v1/events";
   request.headers = {{"Authorization", "Bearer " + token()}};
-  request.context.caller = {"oidc:ann", http::Role::kUser};
+  http::Response response;
+  http::begin_request({nullptr, &provider_}, request, response);
   auto now = std::chrono::system_clock::now();
   const auto is_valid = http::validity_of({nullptr, &provider_}, request, [&] { return now; });
   EXPECT_TRUE(is_valid());

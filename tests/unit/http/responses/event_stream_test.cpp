@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/error.h"
 #include "server/http/limits.h"
 
 namespace isomesh::http {
@@ -80,6 +81,21 @@ TEST_F(EventStreamTest, OfProgressTheNewestIsKept) {
   const std::string told = told_by(*stream);
   EXPECT_THAT(told, testing::HasSubstr("id: 1000\n"));
   EXPECT_LT(told.size(), 300U);
+}
+
+TEST_F(EventStreamTest, OfAJobThatIsGoneEnds) {
+  for (const ErrorCode code : {ErrorCode::kNotFound, ErrorCode::kGone}) {
+    const auto stream = event_source({.mailbox = broadcaster_.listen_to("a"),
+                                      .past = {event(1, EventKind::kStage)},
+                                      .result = [&]() -> std::string { throw Error(code, ""); },
+                                      .place = places_.take("")});
+    broadcaster_.publish(event(2, EventKind::kDone));
+    std::string bytes;
+    ASSERT_EQ(stream->next(bytes), net::Source::More::kBytes);
+    std::string nothing;
+    EXPECT_EQ(stream->next(nothing), net::Source::More::kEnd);
+    EXPECT_EQ(nothing, "");
+  }
 }
 
 TEST_F(EventStreamTest, WhoMayNoLongerListenHearsNothing) {
