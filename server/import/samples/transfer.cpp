@@ -18,7 +18,9 @@
 #include "server/import/labels/combinations.h"
 #include "server/import/samples/payload.h"
 #include "server/import/samples/wide_labels.h"
+#include "server/volume/geometry.h"
 #include "server/volume/labels.h"
+#include "server/volume/sample_order.h"
 #include "server/volume/statistics.h"
 
 namespace isomesh::import {
@@ -363,6 +365,19 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
   throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a segmentation.");
 }
 
+// Makes the order of axes canonical, and that of the samples. Later calls change nothing. The
+// header of the file is then to be written again.
+void put_in_order(CanonicalWriter& writer, Volume& volume) {
+  const volume::AxisOrder order = volume::canonical_order(volume.geometry);
+  if (!volume.stored_axes) volume.stored_axes = volume::axis_codes(volume.geometry);
+  volume.geometry = volume::canonical_geometry(volume.dims, volume.geometry);
+  volume::put_in_order(writer.samples(), bytes_per_sample(volume.type), volume.dims, order);
+  volume.dims = volume::in_order(volume.dims, order);
+  if (const auto fault = find_fault(volume.dims, volume.geometry)) {
+    throw_unusable("The geometry of the volume cannot be used: " + fault->message + ".");
+  }
+}
+
 }  // namespace
 
 Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task) {
@@ -374,6 +389,7 @@ Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportT
   const std::span<std::byte> stored =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   read_samples(samples.file, samples.offset, samples.layout, stored);
+  put_in_order(writer, volume);
   if (samples.labels_if_flat && !may_be_labels(stored, volume)) volume.labels.clear();
   volume = finish(writer, std::move(volume),
                   {.are_labels = samples.are_labels,
@@ -406,6 +422,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
 }
 
 Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
+  put_in_order(writer, volume);
   const auto samples =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   std::uint64_t left_out = kind.left_out;
@@ -429,7 +446,7 @@ Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
   const bool is_closed = kind.is_segmentation && is_integer(volume.type);
   if (is_closed) {
     close_ends(writer, volume);
-  } else if (kind.is_segmentation || is_converted) {
+  } else {
     writer.shorten({volume.dims, volume.type, volume.geometry});
   }
   if (kind.is_segmentation || is_converted) {

@@ -26,11 +26,12 @@ bool leaves_members_open(const Error& error, const ImportOptions& options) {
 }
 
 // The id of a volume: the digest of what its upload says. It has a key if that concerns a person:
-// without one, anyone who sees an id, for instance in a log, could test whose it is. The format and
-// the names of files say nothing of the volume.
+// without one, anyone who sees an id, for instance in a log, could test whose it is. The format,
+// the order of axes and the names of files say nothing of the volume.
 std::string id_of(Volume volume, const std::string& key) {
   volume.name.reset();
   volume.format.clear();
+  volume.stored_axes.reset();
   volume.ignored.clear();
   const std::string said = to_full_json(volume);
   return volume.dicom ? to_hex(hmac_sha256(key, said)) : sha256_of(said);
@@ -176,6 +177,7 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   blobs_.mark_named(blob.key);
   // These are of the files of this upload.
   stored.format = std::move(volume.format);
+  stored.stored_axes = std::move(volume.stored_axes);
   stored.ignored = std::move(volume.ignored);
   return {std::move(stored), is_new};
 }

@@ -1,9 +1,13 @@
 #include "tests/unit/import/files.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
+
+#include "server/volume/geometry.h"
+#include "server/volume/sample_order.h"
 
 namespace isomesh::import::test {
 
@@ -17,12 +21,57 @@ std::size_t Folder::entries() const {
   return static_cast<std::size_t>(std::distance(begin(all), end(all)));
 }
 
+namespace {
+
+// The order that undoes the canonical one.
+volume::AxisOrder files_order(const std::string& stored_axes) {
+  volume::AxisOrder order = {};
+  for (std::size_t axis = 0; axis < order.size(); ++axis) {
+    const std::size_t same = std::string("LPS").find(stored_axes[axis]);
+    const std::size_t opposite = std::string("RAI").find(stored_axes[axis]);
+    order[axis] = same < 3 ? static_cast<int>(same) + 1 : -static_cast<int>(opposite) - 1;
+  }
+  return order;
+}
+
+Geometry turned_back(const Volume& volume, const volume::AxisOrder& order) {
+  Geometry geometry = volume.geometry;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int from = std::abs(order[axis]) - 1;
+    const auto place = static_cast<std::size_t>(from);
+    const volume::Vector3 step = volume::step_of(volume.geometry, from);
+    geometry.spacing[axis] = volume.geometry.spacing[place];
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double part = volume.geometry.direction[row * 3 + place];
+      geometry.direction[row * 3 + axis] = order[axis] < 0 ? -part + 0.0 : part;
+      if (order[axis] < 0) geometry.origin[row] += step[row] * (volume.dims[place] - 1.0);
+    }
+  }
+  constexpr double kRounding = 1e9;
+  for (double& place : geometry.origin) place = std::round(place * kRounding) / kRounding + 0.0;
+  return geometry;
+}
+
+}  // namespace
+
+Outcome in_files_order(Outcome outcome) {
+  Volume& volume = outcome.volume;
+  const volume::AxisOrder order = files_order(volume.stored_axes.value());
+  std::span<std::byte> bytes = std::as_writable_bytes(std::span(outcome.canonical));
+  volume::put_in_order(bytes.subspan(kHeaderBytes), bytes_per_sample(volume.type), volume.dims,
+                       order);
+  volume.geometry = turned_back(volume, order);
+  volume.dims = volume::in_order(volume.dims, order);
+  return outcome;
+}
+
 Outcome outcome_of(const std::filesystem::path& target,
                    const std::function<Volume(const std::filesystem::path& target)>& import) {
   Outcome outcome;
   try {
     outcome.volume = import(target);
-    outcome.canonical = read_file(target);
+    outcome.canonical = outcome.stored = read_file(target);
+    outcome = in_files_order(std::move(outcome));
   } catch (const Error& error) {
     outcome.code = error.code();
     outcome.error = error.what();
