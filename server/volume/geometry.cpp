@@ -343,19 +343,31 @@ std::array<std::uint32_t, 3> in_order(const std::array<std::uint32_t, 3>& dims,
   return {dims[axis_at(order, 0)], dims[axis_at(order, 1)], dims[axis_at(order, 2)]};
 }
 
+Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
+                  const AxisOrder& order) {
+  Geometry result = geometry;
+  result.direction = turned(geometry.direction, order);
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    const std::size_t axis = axis_at(order, place);
+    result.spacing[place] = geometry.spacing[axis];
+    if (order[place] > 0) continue;
+    const Vector3 step = step_of(geometry, static_cast<int>(axis));
+    for (std::size_t row = 0; row < 3; ++row) result.origin[row] += step[row] * (dims[axis] - 1.0);
+  }
+  return normalised(result);
+}
+
 Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry) {
   const Vector3 before = way_to_middle(dims, geometry);
   Geometry settled = geometry;
   std::ranges::transform(geometry.spacing, settled.spacing.begin(), settled_spacing);
   std::ranges::transform(geometry.direction, settled.direction.begin(), settled_cosine);
   const AxisOrder order = canonical_order(geometry);
-  Geometry result = settled;
-  result.direction = turned(settled.direction, order);
-  for (std::size_t place = 0; place < order.size(); ++place) {
-    result.spacing[place] = settled.spacing[axis_at(order, place)];
-  }
+  Geometry result = in_order(dims, settled, order);
   const Vector3 after = way_to_middle(in_order(dims, order), result);
-  for (std::size_t row = 0; row < 3; ++row) result.origin[row] += before[row] - after[row];
+  for (std::size_t row = 0; row < 3; ++row) {
+    result.origin[row] = geometry.origin[row] + before[row] - after[row];
+  }
   const PlaceGrid grid(std::ranges::min(result.spacing),
                        largest_coordinate(in_order(dims, order), result));
   for (double& place : result.origin) place = grid.nearest(place);

@@ -60,9 +60,12 @@ AxisOrder canonical_order(const Geometry& geometry);
 // axes in the canonical order, "RAS" for the usual NIfTI file.
 std::string axis_codes(const Geometry& geometry);
 
-// The sizes along the axes in that order.
+// The sizes along the axes in that order, and the same lattice counted in it: axis a is the present
+// axis |order[a]|, reversed if the number is negative.
 std::array<std::uint32_t, 3> in_order(const std::array<std::uint32_t, 3>& dims,
                                       const AxisOrder& order);
+Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
+                  const AxisOrder& order);
 
 // The lattice in the canonical order of axes, with numbers that do not depend on the sample from
 // which a file counts. Both ends of a mirrored axis are rounded in their own way, in single or in

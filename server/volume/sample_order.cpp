@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cstdlib>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMostSliceBytes = std::size_t{64} << 20;
 // Samples along each side of a tile, which stays in the first cache.
-constexpr std::size_t kTile = 32;
+constexpr std::size_t kTile = 64;
 
 // An axis whose samples are still to be reversed, or not.
 struct Axis {
@@ -50,24 +51,89 @@ void exchange_in_place(Sample* samples, std::size_t unit, const Axis& fast, cons
   }
 }
 
-// Exchanges the axes of a slice, from one place to another. Tiles go through a small copy, because
-// rows of 2^n samples all compete for a few places in the cache.
+constexpr std::size_t kVectorBytes = 16;  // that every processor has
+// Samples along each side of a square block, whose rows are vectors.
+template <class Sample>
+constexpr std::size_t kBlock = kVectorBytes / sizeof(Sample);
+template <class Sample>
+struct Vector {
+  using Type [[gnu::vector_size(kVectorBytes)]] = Sample;
+};
+template <class Sample>
+using Row = typename Vector<Sample>::Type;
+
+// The samples of two vectors in turn: those of the first halves, or of the second.
+template <class Sample, std::size_t First, std::size_t... At>
+Row<Sample> in_turn(Row<Sample> one, Row<Sample> other, std::index_sequence<At...>) {
+  return __builtin_shufflevector(
+      one, other, (At % 2 == 0 ? First + At / 2 : kBlock<Sample> + First + At / 2)...);
+}
+
+// Exchanges the axes of a block: each round shuffles its rows as the halves of a deck of cards.
+template <class Sample, class Source, class Target>
+void exchange_block(const Source& source, const Target& target) {
+  constexpr std::size_t kRows = kBlock<Sample>;
+  constexpr std::make_index_sequence<kRows> kAll;
+  std::array<Row<Sample>, kRows> rows;
+  std::array<Row<Sample>, kRows> next;
+  for (std::size_t at = 0; at < kRows; ++at) std::memcpy(&rows[at], source(at), kVectorBytes);
+  for (std::size_t round = 1; round < kRows; round *= 2) {
+    for (std::size_t at = 0; at < kRows / 2; ++at) {
+      const auto one = rows[at];
+      const auto other = rows[at + kRows / 2];
+      next[2 * at] = in_turn<Sample, 0>(one, other, kAll);
+      next[2 * at + 1] = in_turn<Sample, kRows / 2>(one, other, kAll);
+    }
+    rows = next;
+  }
+  for (std::size_t at = 0; at < kRows; ++at) std::memcpy(target(at), &rows[at], kVectorBytes);
+}
+
+// A part of a slice: so many samples from `near` along its fast axis, and from `far` along the slow
+// one, as they are numbered afterwards.
+struct Part {
+  std::size_t near = 0;
+  std::size_t far = 0;
+  std::size_t rows = 0;
+  std::size_t columns = 0;
+};
+
+template <class Sample>
+void exchange_part(const Sample* from, const Axis& fast, const Axis& slow, const Part& part,
+                   Sample* to) {
+  constexpr std::size_t kSide = kBlock<Sample>;
+  const std::size_t first = fast.is_reversed ? fast.size - part.near - part.rows : part.near;
+  const auto source = [&](std::size_t column) {
+    return from + slow.place(part.far + column) * fast.size + first;
+  };
+  const auto target = [&](std::size_t row) {
+    const std::size_t place = fast.is_reversed ? part.rows - 1 - row : row;
+    return to + (part.near + place) * slow.size + part.far;
+  };
+  const std::size_t whole_rows = part.rows / kSide * kSide;
+  const std::size_t whole_columns = part.columns / kSide * kSide;
+  for (std::size_t row = 0; row < whole_rows; row += kSide) {
+    for (std::size_t column = 0; column < whole_columns; column += kSide) {
+      exchange_block<Sample>([&](std::size_t at) { return source(column + at) + row; },
+                             [&](std::size_t at) { return target(row + at) + column; });
+    }
+  }
+  for (std::size_t row = 0; row < part.rows; ++row) {
+    for (std::size_t column = row < whole_rows ? whole_columns : 0; column < part.columns;
+         ++column) {
+      target(row)[column] = source(column)[row];
+    }
+  }
+}
+
+// Exchanges the axes of a slice, from one place to another.
 template <class Sample>
 void exchange(const Sample* from, const Axis& fast, const Axis& slow, Sample* to) {
-  std::array<std::array<Sample, kTile>, kTile> tile;
-  for (std::size_t far = 0; far < slow.size; far += kTile) {
-    const std::size_t columns = std::min(kTile, slow.size - far);
-    for (std::size_t near = 0; near < fast.size; near += kTile) {
-      const std::size_t rows = std::min(kTile, fast.size - near);
-      const std::size_t first = fast.is_reversed ? fast.size - near - rows : near;
-      for (std::size_t column = 0; column < columns; ++column) {
-        const Sample* const source = from + slow.place(far + column) * fast.size + first;
-        for (std::size_t row = 0; row < rows; ++row) tile[row][column] = source[row];
-      }
-      for (std::size_t row = 0; row < rows; ++row) {
-        const std::size_t of_tile = fast.is_reversed ? rows - 1 - row : row;
-        std::copy_n(tile[of_tile].begin(), columns, to + (near + row) * slow.size + far);
-      }
+  for (std::size_t near = 0; near < fast.size; near += kTile) {
+    for (std::size_t far = 0; far < slow.size; far += kTile) {
+      exchange_part(
+          from, fast, slow,
+          {near, far, std::min(kTile, fast.size - near), std::min(kTile, slow.size - far)}, to);
     }
   }
 }

@@ -365,6 +365,17 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
   throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a segmentation.");
 }
 
+// Sizes and geometry in the order in which the samples are stored, which may not be that of the
+// header's axes.
+void take_storage_order(const StorageOrder& fastest, Volume& volume) {
+  volume.stored_axes = volume::axis_codes(volume.geometry);
+  volume::AxisOrder order = {};
+  std::ranges::transform(fastest, order.begin(),
+                         [](std::size_t axis) { return static_cast<int>(axis) + 1; });
+  volume.geometry = volume::in_order(volume.dims, volume.geometry, order);
+  volume.dims = volume::in_order(volume.dims, order);
+}
+
 // Makes the order of axes canonical, and that of the samples. Later calls change nothing. The
 // header of the file is then to be written again.
 void put_in_order(CanonicalWriter& writer, Volume& volume) {
@@ -412,6 +423,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   volume.notes = source.notes;
   note_assumed_spacing(source, task.options, volume);
   std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
+  take_storage_order(source.storage_order, volume);
   if (source.layers)
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task);

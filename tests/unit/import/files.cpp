@@ -34,24 +34,6 @@ volume::AxisOrder files_order(const std::string& stored_axes) {
   return order;
 }
 
-Geometry turned_back(const Volume& volume, const volume::AxisOrder& order) {
-  Geometry geometry = volume.geometry;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int from = std::abs(order[axis]) - 1;
-    const auto place = static_cast<std::size_t>(from);
-    const volume::Vector3 step = volume::step_of(volume.geometry, from);
-    geometry.spacing[axis] = volume.geometry.spacing[place];
-    for (std::size_t row = 0; row < 3; ++row) {
-      const double part = volume.geometry.direction[row * 3 + place];
-      geometry.direction[row * 3 + axis] = order[axis] < 0 ? -part + 0.0 : part;
-      if (order[axis] < 0) geometry.origin[row] += step[row] * (volume.dims[place] - 1.0);
-    }
-  }
-  constexpr double kRounding = 1e9;
-  for (double& place : geometry.origin) place = std::round(place * kRounding) / kRounding + 0.0;
-  return geometry;
-}
-
 }  // namespace
 
 Outcome in_files_order(Outcome outcome) {
@@ -60,7 +42,10 @@ Outcome in_files_order(Outcome outcome) {
   std::span<std::byte> bytes = std::as_writable_bytes(std::span(outcome.canonical));
   volume::put_in_order(bytes.subspan(kHeaderBytes), bytes_per_sample(volume.type), volume.dims,
                        order);
-  volume.geometry = turned_back(volume, order);
+  volume.geometry = volume::in_order(volume.dims, volume.geometry, order);
+  constexpr double kRounding = 1e9;
+  for (double& place : volume.geometry.origin)
+    place = std::round(place * kRounding) / kRounding + 0;
   volume.dims = volume::in_order(volume.dims, order);
   return outcome;
 }
