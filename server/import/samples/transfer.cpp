@@ -347,7 +347,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
     const auto dims =
         source.is_segmentation ? with_room(volume.dims, type, task.limits) : volume.dims;
     CanonicalWriter writer(task.target, {dims, type, volume.geometry});
-    const auto combinations = with_sample(
+    auto combinations = with_sample(
         canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
           using Sample = decltype(sample);
           if constexpr (std::is_integral_v<Sample>) {
@@ -358,6 +358,8 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
           }
         });
     if (!combinations) continue;
+    combinations->sort_values(
+        type, writer.samples().first(volume.sample_count() * isomesh::bytes_per_sample(type)));
     volume.labels = combinations->entries(source.labels);
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
     return finish(writer, std::move(volume), {.is_segmentation = source.is_segmentation});
