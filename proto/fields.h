@@ -109,6 +109,9 @@ void visit(Is<Volume> auto& self, auto&& field) {
   field("spacing", self.geometry.spacing);
   field("origin", self.geometry.origin);
   field("direction", self.geometry.direction);
+  if (is_told(self, self.stored_axes.has_value())) {
+    field("stored_axes", self.stored_axes);
+  }
   field("range", self.range);
   field("suggested_iso", self.suggested_iso);
   field("bytes", self.bytes);

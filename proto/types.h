@@ -147,7 +147,8 @@ enum class SaidModality { kCt };
 enum class NiftiForm { kSform, kQform };
 
 struct Volume {
-  // Hex digest of what the upload says: samples and all else but name, format and what was ignored.
+  // Hex digest of what the upload says: samples and all else but facts of its files: name, format,
+  // order of axes and what was ignored.
   std::string id;
   // Hex SHA-256 of samples and geometry. Volumes with the same ones share their bytes and meshes.
   std::string samples;
@@ -158,6 +159,10 @@ struct Volume {
   std::array<std::uint32_t, 3> dims = {0, 0, 0};  // samples along x, y, z; x runs fastest
   SampleType type = SampleType::kUint8;
   Geometry geometry;
+  // The directions in which the first, second and third index of the uploaded file increase, such
+  // as "RAS". The volume's own are in the canonical order (volume/geometry.h). Empty for volumes of
+  // before it was told.
+  std::optional<std::string> stored_axes = {};
   std::array<double, 2> range = {0, 0};  // smallest and largest sample
   double suggested_iso = 0;              // Otsu's threshold
   std::uint64_t bytes = 0;               // of the samples

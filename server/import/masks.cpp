@@ -206,6 +206,7 @@ class Union {
     volume_.format = mask.format;
     volume_.dims = mask.dims;
     volume_.geometry = mask.geometry;
+    volume_.stored_axes = mask.stored_axes;
     constexpr SampleType kStateType = SampleType::kUint32;
     check_limits(volume_.sample_count(), kStateType, task_.limits);
     states_.emplace(part_.scratch / "states",

@@ -108,6 +108,111 @@ bool is_perpendicular(const Geometry& geometry) {
   return true;
 }
 
+std::size_t axis_at(const AxisOrder& order, std::size_t place) {
+  return static_cast<std::size_t>(std::abs(order[place]) - 1);
+}
+
+std::array<double, 9> turned(const std::array<double, 9>& direction, const AxisOrder& order) {
+  std::array<double, 9> result = {};
+  for (std::size_t axis = 0; axis < order.size(); ++axis) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double part = direction[row * 3 + axis_at(order, axis)];
+      result[row * 3 + axis] = order[axis] < 0 ? -part : part;
+    }
+  }
+  return result;
+}
+
+// --- Canonical form ------------------------------------------------------------------------------
+
+constexpr double kEqualCosines = 1e-4;
+
+struct Candidate {
+  AxisOrder order = kFilesOrder;
+  std::array<double, 9> direction = {};
+};
+
+std::vector<Candidate> right_handed_orders(const std::array<double, 9>& direction) {
+  std::vector<Candidate> candidates;
+  AxisOrder axes = kFilesOrder;
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      AxisOrder order = axes;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if ((signs >> axis & 1U) != 0) order[axis] = -order[axis];
+      }
+      const Candidate candidate = {order, turned(direction, order)};
+      if (determinant(candidate.direction) > 0) candidates.push_back(candidate);
+    }
+  } while (std::ranges::next_permutation(axes).found);
+  return candidates;
+}
+
+// Leaves those with the largest value.
+template <class Value>
+void keep_largest(std::vector<Candidate>& candidates, const Value& value) {
+  double largest = -std::numeric_limits<double>::infinity();
+  for (const Candidate& each : candidates) largest = std::max(largest, value(each));
+  std::erase_if(candidates,
+                [&](const Candidate& each) { return value(each) < largest - kEqualCosines; });
+}
+
+// The nearest power of ten. Its borders are at roots, because spacings are often powers.
+int decade(double value) { return static_cast<int>(std::lround(std::log10(value))); }
+
+// Rounds to so many decimals; a negative number of them is one of zeros. Numbers halfway between
+// two are common, and an error of rounding must not decide them. So the border is not halfway.
+double rounded(double value, int decimals) {
+  constexpr double kBorder = 0.4876543;
+  const double scale = std::pow(10.0, std::abs(decimals));
+  const double size = std::abs(value);
+  const double count = std::floor((decimals < 0 ? size / scale : size * scale) + kBorder);
+  if (count >= 0x1p53) return value;  // coarser than the decimals
+  return std::copysign(decimals < 0 ? count * scale : count / scale, value);
+}
+
+double settled_spacing(double spacing) {
+  const double fine = rounded(spacing, 12 - decade(spacing));
+  const double coarse = rounded(fine, 5 - decade(spacing));
+  return std::abs(fine - coarse) <= fine * 0x1p-24 ? coarse : fine;
+}
+
+double settled_cosine(double cosine) {
+  constexpr double kNear = 1e-7;
+  if (std::abs(cosine - std::round(cosine)) <= kNear) return std::round(cosine);
+  return rounded(cosine, 10);
+}
+
+// Rounds a place to numbers as people choose them, if single precision may be all that is between.
+class PlaceGrid {
+ public:
+  PlaceGrid(double smallest_spacing, double largest_coordinate)
+      : decade_(decade(smallest_spacing)),
+        near_(std::max(smallest_spacing * 0x1p-15,
+                       std::min(largest_coordinate * 0x1p-23, std::pow(10.0, decade_ - 3) / 8))) {}
+
+  double nearest(double place) const {
+    const double fine = rounded(place, 7 - decade_);
+    const double coarse = rounded(fine, 3 - decade_);
+    return std::abs(fine - coarse) <= near_ ? coarse : fine;
+  }
+
+ private:
+  int decade_;
+  double near_;
+};
+
+// The way from the first sample of a lattice to its middle.
+Vector3 way_to_middle(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry) {
+  Vector3 way = {0, 0, 0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3 step = step_of(geometry, axis);
+    const double steps = (dims[static_cast<std::size_t>(axis)] - 1.0) / 2;
+    for (std::size_t row = 0; row < 3; ++row) way[row] += step[row] * steps;
+  }
+  return way;
+}
+
 // Checks the sizes of a request, as volume_dims does for a file.
 void check_dims(const RawDescription& description) {
   const std::array<std::uint64_t, 3> sizes = {description.dims[0], description.dims[1],
@@ -197,15 +302,8 @@ std::string to_string(const AxisOrder& order) {
 Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
                     const AxisOrder& order) {
   Geometry result = geometry;
-  bool is_turned = false;
-  for (std::size_t axis = 0; axis < order.size(); ++axis) {
-    const auto from = static_cast<std::size_t>(std::abs(order[axis]) - 1);
-    is_turned = is_turned || from != axis;
-    for (std::size_t row = 0; row < 3; ++row) {
-      const double part = geometry.direction[row * 3 + from];
-      result.direction[row * 3 + axis] = order[axis] < 0 ? -part : part;
-    }
-  }
+  result.direction = turned(geometry.direction, order);
+  const bool is_turned = axis_at(order, 0) != 0 || axis_at(order, 1) != 1 || axis_at(order, 2) != 2;
   if (is_turned && !is_perpendicular(geometry)) {
     throw_unusable(
         "The axes of this volume are not perpendicular, so it can be flipped, but not turned");
@@ -217,6 +315,62 @@ Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& ge
       result.origin[row] += (before[row] - after[row]) * (dims[axis] - 1.0) / 2;
     }
   }
+  return normalised(result);
+}
+
+AxisOrder canonical_order(const Geometry& geometry) {
+  std::vector<Candidate> candidates = right_handed_orders(geometry.direction);
+  keep_largest(candidates, [](const Candidate& each) {
+    return each.direction[0] + each.direction[4] + each.direction[8];
+  });
+  for (std::size_t at = 0; at < geometry.direction.size(); ++at) {
+    keep_largest(candidates, [&](const Candidate& each) { return each.direction[at]; });
+  }
+  return candidates.front().order;
+}
+
+std::string axis_codes(const Geometry& geometry) {
+  const AxisOrder order = canonical_order(geometry);
+  std::string codes(order.size(), ' ');
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    codes[axis_at(order, place)] = (order[place] < 0 ? "RAI" : "LPS")[place];
+  }
+  return codes;
+}
+
+std::array<std::uint32_t, 3> in_order(const std::array<std::uint32_t, 3>& dims,
+                                      const AxisOrder& order) {
+  return {dims[axis_at(order, 0)], dims[axis_at(order, 1)], dims[axis_at(order, 2)]};
+}
+
+Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
+                  const AxisOrder& order) {
+  Geometry result = geometry;
+  result.direction = turned(geometry.direction, order);
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    const std::size_t axis = axis_at(order, place);
+    result.spacing[place] = geometry.spacing[axis];
+    if (order[place] > 0) continue;
+    const Vector3 step = step_of(geometry, static_cast<int>(axis));
+    for (std::size_t row = 0; row < 3; ++row) result.origin[row] += step[row] * (dims[axis] - 1.0);
+  }
+  return normalised(result);
+}
+
+Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry) {
+  const Vector3 before = way_to_middle(dims, geometry);
+  Geometry settled = geometry;
+  std::ranges::transform(geometry.spacing, settled.spacing.begin(), settled_spacing);
+  std::ranges::transform(geometry.direction, settled.direction.begin(), settled_cosine);
+  const AxisOrder order = canonical_order(geometry);
+  Geometry result = in_order(dims, settled, order);
+  const Vector3 after = way_to_middle(in_order(dims, order), result);
+  for (std::size_t row = 0; row < 3; ++row) {
+    result.origin[row] = geometry.origin[row] + before[row] - after[row];
+  }
+  const PlaceGrid grid(std::ranges::min(result.spacing),
+                       largest_coordinate(in_order(dims, order), result));
+  for (double& place : result.origin) place = grid.nearest(place);
   return normalised(result);
 }
 

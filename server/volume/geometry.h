@@ -49,6 +49,38 @@ std::string to_string(const AxisOrder& order);
 Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
                     const AxisOrder& order);
 
+// The canonical order of axes: index i increases towards the left of the patient, j towards the
+// back, k towards the head, as nearly as the directions allow. It is the right-handed order with
+// the largest sum of the cosines between i and L, j and P, k and S. Among sums within 1e-4 of it,
+// the direction matrix decides that is lexicographically greatest, row by row; numbers within 1e-4
+// are equal. So it depends on the lattice alone, and not on the order in which a file has its axes.
+AxisOrder canonical_order(const Geometry& geometry);
+
+// Three letters for the directions in which i, j and k increase, as nibabel's axis codes: "LPS" for
+// axes in the canonical order, "RAS" for the usual NIfTI file.
+std::string axis_codes(const Geometry& geometry);
+
+// The sizes along the axes in that order, and the same lattice counted in it: axis a is the present
+// axis |order[a]|, reversed if the number is negative.
+std::array<std::uint32_t, 3> in_order(const std::array<std::uint32_t, 3>& dims,
+                                      const AxisOrder& order);
+Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry,
+                  const AxisOrder& order);
+
+// The lattice in the canonical order of axes, with numbers that do not depend on the sample from
+// which a file counts. Both ends of a mirrored axis are rounded in their own way, in single or in
+// double precision. The middle of the lattice stays where it is, and
+//   - a spacing is rounded to 12 digits, and to 5 or 6 if that is within single precision (2^-24);
+//   - a cosine within 1e-7 of -1, 0 or 1 becomes that, and others are rounded to 10 decimals;
+//   - a number of the origin is rounded to 1e-7 of the power of ten that is nearest to the smallest
+//     spacing, and to 1e-3 of it if that is within single precision: 2^-23 of the largest
+//     coordinate, but at most 1/8 of that step, and at least 2^-15 of the smallest spacing.
+// So a number as people choose it is the same after single precision, and any number after double
+// precision. Beside single precision, rounding moves no sample by more than about 3e-5 of the
+// smallest spacing. The result of the result is itself. The geometry must be normalised and free of
+// faults (find_fault).
+Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry);
+
 // The first reason why a geometry is unusable, or empty. Reasons are: numbers that are not finite;
 // spacings that are not positive; direction columns that are not unit vectors (to 1e-3) or nearly
 // coplanar; coordinates so large that single precision, used in meshes, cannot separate

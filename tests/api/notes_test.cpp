@@ -1,5 +1,6 @@
 // Tests of notes about how a volume was read, and of the options that errors offer, from file to
 // mesh.
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -344,19 +345,26 @@ TEST_F(NotesTest, AVolumeThatItsFilePlacesWronglyIsFlippedAndTurned) {
   for (const std::string axes : {"", "?axes=", "?axes=x,y,z", "?axes=x,y", "?axes=x,x,y"}) {
     EXPECT_EQ(daemon_.send("POST", path + axes).status, 400) << axes;
   }
+  EXPECT_EQ(head.stored_axes, "LPS");
   const Volume flipped = daemon_.client().reorient_volume(head.id, "-x,y,z");
-  EXPECT_EQ(flipped.geometry.direction[0], -1);
-  EXPECT_EQ(flipped.geometry.origin[0], flipped.dims[0] - 1.0);
+  EXPECT_EQ(flipped.stored_axes, "RPS");
+  // It is flipped about its centre, and its axes have the order of the patient again.
+  EXPECT_EQ(flipped.geometry, head.geometry);
   EXPECT_EQ(daemon_.send("POST", path + "?axes=-x,y,z").status, 200);
   EXPECT_EQ(daemon_.client().reorient_volume(flipped.id, "-x,y,z").id, head.id);
   const Volume turned = daemon_.client().reorient_volume(flipped.id, "y,x,z");
-  EXPECT_THAT(turned.notes.back().detail, EndsWith("gives to y,-x,z."));
-  EXPECT_EQ(daemon_.send("POST", path + "?axes=y,-x,z").status, 200);
-  // The samples are the same.
+  EXPECT_THAT(turned.notes.back().detail, EndsWith("gives to -y,x,z."));
+  EXPECT_EQ(turned.geometry.direction, head.geometry.direction);
+  EXPECT_EQ(daemon_.send("POST", path + "?axes=-y,x,z").status, 200);
+  // The samples of each row are in the opposite order.
   const auto slice = [&](const std::string& id) {
     return daemon_.send("GET", "/v1/volumes/" + id + "/slice").body;
   };
-  EXPECT_EQ(slice(flipped.id), slice(head.id));
+  std::string rows = slice(head.id);
+  for (auto row = rows.begin(); row != rows.end(); row += head.dims[0]) {
+    std::reverse(row, row + head.dims[0]);
+  }
+  EXPECT_EQ(slice(flipped.id), rows);
 }
 
 TEST_F(NotesTest, AFlippedDicomVolumeKeepsItsPatientButNotItsFrame) {

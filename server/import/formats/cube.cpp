@@ -123,7 +123,7 @@ SourceVolume parse_cube(const InputFile& file, const Companions& /*companions*/,
     return static_cast<std::uint64_t>(std::abs(axis.count));
   });
   volume.dims = volume_dims(sizes);
-  volume.stored_axes = {2, 1, 0};
+  volume.storage_order = {2, 1, 0};
   volume.layout.type = StoredType::kFloat32;
   volume.encoding = Encoding::kText;
   const std::uint64_t values = skip_atoms(lines, header->atoms);

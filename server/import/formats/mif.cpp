@@ -209,7 +209,7 @@ SourceVolume described(const MifHeader& header, const ImportOptions& options) {
   }
   std::array<std::size_t, 3> order = kXFastest;
   std::ranges::sort(order, {}, [&](std::size_t axis) { return axes[axis].rank; });
-  volume.stored_axes = order;
+  volume.storage_order = order;
   choose_mif_volume(sizes, axes, options, volume);
   volume.geometry = mif_geometry(header, axes, volume);
   return volume;

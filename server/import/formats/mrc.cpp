@@ -167,9 +167,9 @@ SourceVolume parse_mrc(const InputFile& file, const Companions& /*companions*/,
   SourceVolume volume;
   std::array<std::uint64_t, 3> sizes = {};
   for (std::size_t at = 0; at < 3; ++at) {
-    volume.stored_axes[at] = static_cast<std::size_t>(header->axes[at]) - 1;
+    volume.storage_order[at] = static_cast<std::size_t>(header->axes[at]) - 1;
     const auto size = static_cast<std::uint64_t>(header->size[at]);
-    sizes[volume.stored_axes[at]] = at == 2 ? size / volumes : size;
+    sizes[volume.storage_order[at]] = at == 2 ? size / volumes : size;
   }
   volume.dims = volume_dims(sizes);
   set_type(*header, volume);

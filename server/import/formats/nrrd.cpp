@@ -224,7 +224,7 @@ std::string frames_axis(const std::string& kind) {
 }
 
 // The images of a sequence take turns with each sample or row, or follow each other.
-StoredAxes axes_of_frames(std::uint64_t run, std::uint32_t row) {
+StorageOrder axes_of_frames(std::uint64_t run, std::uint32_t row) {
   if (run == 1) return {2, 0, 1};
   if (run == row) return {0, 2, 1};
   return kXFastest;
@@ -262,7 +262,7 @@ SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
   } else {
     count = volumes_of_frames(count, frames_axis(kind), options, volume);
   }
-  if (count < sizes.volumes) volume.stored_axes = axes_of_frames(sizes.run, volume.dims[0]);
+  if (count < sizes.volumes) volume.storage_order = axes_of_frames(sizes.run, volume.dims[0]);
   choose_volume(count, numbered(kind == "time" ? kind : "their " + kind, kind), options, volume);
   if (count > 1 && !is_consecutive) volume.chosen.run = sizes.run;
   set_segments(fields, is_interleaved, true, volume);

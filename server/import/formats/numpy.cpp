@@ -145,7 +145,7 @@ SourceVolume parse_numpy(const InputFile& file, const Companions& /*companions*/
   choose_volume(volumes_beyond(sizes), numbered("the array's first index", "index"), options,
                 volume);
   if (header.is_fortran) {
-    volume.stored_axes = {2, 1, 0};
+    volume.storage_order = {2, 1, 0};
     if (volume.chosen.count > 1) volume.chosen.run = 1;
   }
   volume.payload = range_from(file, header.bytes);

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <numeric>
 #include <string>
+#include <type_traits>
 
+#include "proto/samples.h"
 #include "server/import/labels/label_table.h"
 #include "server/import/source/names.h"
 
@@ -104,6 +107,48 @@ bool Combinations::write(std::span<const State> states, SampleType type,
   }
   return type == SampleType::kUint8 ? write_as<std::uint8_t>(values, target)
                                     : write_as<std::uint16_t>(values, target);
+}
+
+// By the highest labels first. Each set of labels has one state.
+bool Combinations::is_before(State one, State other) const {
+  while (one != other) {
+    const std::uint32_t label = nodes_[one].label;
+    const std::uint32_t its = nodes_[other].label;
+    if (label != its) return label < its;
+    one = nodes_[one].parent;
+    other = nodes_[other].parent;
+  }
+  return false;
+}
+
+void Combinations::sort_values(SampleType type, std::span<std::byte> samples) {
+  std::vector<State> states;
+  std::vector<std::uint32_t> values;
+  for (State state = 0; state < nodes_.size(); ++state) {
+    if (nodes_[state].size < 2 || nodes_[state].value == 0) continue;
+    states.push_back(state);
+    values.push_back(nodes_[state].value);
+  }
+  std::ranges::sort(states, [&](State one, State other) { return is_before(one, other); });
+  std::ranges::sort(values);
+  std::vector<std::uint32_t> new_values(next_value_);
+  std::iota(new_values.begin(), new_values.end(), 0);
+  bool is_any = false;
+  for (std::size_t at = 0; at < states.size(); ++at) {
+    std::uint32_t& value = nodes_[states[at]].value;
+    is_any = is_any || value != values[at];
+    new_values[value] = values[at];
+    value = values[at];
+  }
+  if (!is_any) return;
+  with_sample(type, [&](auto sample) {
+    using Sample = decltype(sample);
+    if constexpr (std::is_unsigned_v<Sample>) {
+      auto* const first = reinterpret_cast<Sample*>(samples.data());
+      std::transform(first, first + samples.size() / sizeof(Sample), first,
+                     [&](Sample value) { return static_cast<Sample>(new_values[value]); });
+    }
+  });
 }
 
 std::optional<Note> Combinations::note() const {

@@ -44,6 +44,10 @@ class Combinations {
   // not fit.
   bool write(std::span<const State> states, SampleType type, std::span<std::byte> target);
 
+  // Numbers the combinations anew, in the order of their labels. So their numbers do not depend on
+  // the order in which samples were written. `samples` are all that were written, as `type`.
+  void sort_values(SampleType type, std::span<std::byte> samples);
+
   // A note on the number of written samples with several labels; empty if there are none.
   std::optional<Note> note() const;
 
@@ -57,6 +61,7 @@ class Combinations {
   };
 
   std::uint32_t next_value();
+  bool is_before(State one, State other) const;
 
   std::vector<Node> nodes_ = {{}};
   std::unordered_map<std::uint64_t, State> children_;  // by parent and label

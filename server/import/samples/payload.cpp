@@ -259,81 +259,6 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
   }
 }
 
-// --- Order of axes -------------------------------------------------------------------------------
-
-struct StoredLattice {
-  const InputFile& file;
-  std::uint64_t offset = 0;
-  std::size_t bytes_per_sample = 1;
-};
-
-constexpr std::uint64_t kBlockBytes = std::uint64_t{64} << 20;
-
-using Box = std::array<std::uint64_t, 3>;  // along x, y and z
-
-class Reorder {
- public:
-  Reorder(const StoredLattice& stored, const std::array<std::uint32_t, 3>& dims,
-          const StoredAxes& axes)
-      : stored_(stored), axes_(axes) {
-    std::uint64_t step = 1;
-    for (const std::size_t axis : axes) {
-      steps_[axis] = step;
-      step *= dims[axis];
-    }
-  }
-
-  // Reads some planes or rows of the result, in runs along the axis that is stored fastest.
-  void read(const Box& first, const Box& size, std::vector<std::byte>& target) {
-    const std::size_t bytes = stored_.bytes_per_sample;
-    const Box into = {1, size[0], size[0] * size[1]};
-    const auto [fastest, middle, slowest] = axes_;
-    target.resize(size[0] * size[1] * size[2] * bytes);
-    run_.resize(size[fastest] * bytes);
-    for (std::uint64_t far = 0; far < size[slowest]; ++far) {
-      for (std::uint64_t near = 0; near < size[middle]; ++near) {
-        const std::uint64_t place = first[fastest] + (first[middle] + near) * steps_[middle] +
-                                    (first[slowest] + far) * steps_[slowest];
-        if (stored_.file.read(stored_.offset + place * bytes, run_) != run_.size()) {
-          throw_unusable("The file ends before its last sample.");
-        }
-        std::byte* to = target.data() + (near * into[middle] + far * into[slowest]) * bytes;
-        for (std::size_t at = 0; at < run_.size(); at += bytes) {
-          std::memcpy(to, run_.data() + at, bytes);
-          to += into[fastest] * bytes;
-        }
-      }
-    }
-  }
-
- private:
-  const StoredLattice& stored_;
-  StoredAxes axes_;
-  Box steps_ = {0, 0, 0};
-  std::vector<std::byte> run_;
-};
-
-// Appends the samples to `target` with x running fastest, then y, then z. `dims` are the sizes
-// along x, y and z. Uses bounded memory and reads the file once for each block of rows that fits.
-// Throws Error kUnusableVolume if the file ends early.
-void write_reordered(const StoredLattice& stored, const std::array<std::uint32_t, 3>& dims,
-                     const StoredAxes& axes, ScratchFile& target) {
-  const std::uint64_t row = std::uint64_t{dims[0]} * stored.bytes_per_sample;
-  const std::uint64_t rows = std::max<std::uint64_t>(kBlockBytes / row, 1);
-  const std::uint64_t planes = std::max<std::uint64_t>(rows / dims[1], 1);
-  const std::uint64_t rows_at_once = std::min<std::uint64_t>(rows, dims[1]);
-  Reorder reorder(stored, dims, axes);
-  std::vector<std::byte> block;
-  for (std::uint64_t z = 0; z < dims[2]; z += planes) {
-    for (std::uint64_t y = 0; y < dims[1]; y += rows_at_once) {
-      reorder.read({0, y, z},
-                   {dims[0], std::min(rows_at_once, dims[1] - y), std::min(planes, dims[2] - z)},
-                   block);
-      target.write(block);
-    }
-  }
-}
-
 std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume,
                              std::uint64_t expected) {
   const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
@@ -367,7 +292,6 @@ Payload::Payload(const InputFile& file, const SourceVolume& volume,
   } else {
     offset_ += volume.chosen.index * volume.volume_bytes();
   }
-  if (volume.stored_axes != kXFastest) reorder(volume, scratch);
 }
 
 void Payload::decode(const SourceVolume& volume, const std::filesystem::path& scratch) {
@@ -434,15 +358,6 @@ void Payload::pick(const SourceVolume& volume, const std::filesystem::path& scra
   } else {
     pick_runs(volume, target);
   }
-  decoded_.emplace(target.path());
-  offset_ = 0;
-}
-
-// Copies the samples into a file of their own, with x running fastest.
-void Payload::reorder(const SourceVolume& volume, const std::filesystem::path& scratch) {
-  const std::size_t size = bytes_per_sample(layout_.type);
-  ScratchFile& target = reordered_.emplace(scratch, ".ordered");
-  write_reordered({file(), offset_, size}, volume.dims, volume.stored_axes, target);
   decoded_.emplace(target.path());
   offset_ = 0;
 }

@@ -13,7 +13,7 @@ namespace isomesh::import {
 
 // The plain bytes of the selected volume's samples. They stay in the input file if they are plain
 // and contiguous there. Otherwise they are in a scratch file, which the destructor removes. Bytes
-// decoded from text are little-endian. x runs fastest.
+// decoded from text are little-endian. They are in the file's order (SourceVolume::storage_order).
 class Payload {
  public:
   // Throws Error kUnusableVolume if the file has fewer samples than declared, if they cannot be
@@ -31,12 +31,10 @@ class Payload {
   void pick(const SourceVolume& volume, const std::filesystem::path& scratch);
   void pick_interleaved(const SourceVolume& volume, ScratchFile& target);
   void pick_runs(const SourceVolume& volume, ScratchFile& target);
-  void reorder(const SourceVolume& volume, const std::filesystem::path& scratch);
 
   const InputFile& file_;
   std::optional<ScratchFile> scratch_;
   std::optional<ScratchFile> picked_;
-  std::optional<ScratchFile> reordered_;
   std::optional<InputFile> decoded_;
   std::uint64_t offset_ = 0;
   SampleLayout layout_;

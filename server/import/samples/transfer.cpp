@@ -18,7 +18,9 @@
 #include "server/import/labels/combinations.h"
 #include "server/import/samples/payload.h"
 #include "server/import/samples/wide_labels.h"
+#include "server/volume/geometry.h"
 #include "server/volume/labels.h"
+#include "server/volume/sample_order.h"
 #include "server/volume/statistics.h"
 
 namespace isomesh::import {
@@ -345,7 +347,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
     const auto dims =
         source.is_segmentation ? with_room(volume.dims, type, task.limits) : volume.dims;
     CanonicalWriter writer(task.target, {dims, type, volume.geometry});
-    const auto combinations = with_sample(
+    auto combinations = with_sample(
         canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
           using Sample = decltype(sample);
           if constexpr (std::is_integral_v<Sample>) {
@@ -356,11 +358,37 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
           }
         });
     if (!combinations) continue;
+    combinations->sort_values(
+        type, writer.samples().first(volume.sample_count() * isomesh::bytes_per_sample(type)));
     volume.labels = combinations->entries(source.labels);
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
     return finish(writer, std::move(volume), {.is_segmentation = source.is_segmentation});
   }
   throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a segmentation.");
+}
+
+// Sizes and geometry in the order in which the samples are stored, which may not be that of the
+// header's axes.
+void take_storage_order(const StorageOrder& fastest, Volume& volume) {
+  volume.stored_axes = volume::axis_codes(volume.geometry);
+  volume::AxisOrder order = {};
+  std::ranges::transform(fastest, order.begin(),
+                         [](std::size_t axis) { return static_cast<int>(axis) + 1; });
+  volume.geometry = volume::in_order(volume.dims, volume.geometry, order);
+  volume.dims = volume::in_order(volume.dims, order);
+}
+
+// Makes the order of axes canonical, and that of the samples. Later calls change nothing. The
+// header of the file is then to be written again.
+void put_in_order(CanonicalWriter& writer, Volume& volume) {
+  const volume::AxisOrder order = volume::canonical_order(volume.geometry);
+  if (!volume.stored_axes) volume.stored_axes = volume::axis_codes(volume.geometry);
+  volume.geometry = volume::canonical_geometry(volume.dims, volume.geometry);
+  volume::put_in_order(writer.samples(), bytes_per_sample(volume.type), volume.dims, order);
+  volume.dims = volume::in_order(volume.dims, order);
+  if (const auto fault = find_fault(volume.dims, volume.geometry)) {
+    throw_unusable("The geometry of the volume cannot be used: " + fault->message + ".");
+  }
 }
 
 }  // namespace
@@ -374,6 +402,7 @@ Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportT
   const std::span<std::byte> stored =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   read_samples(samples.file, samples.offset, samples.layout, stored);
+  put_in_order(writer, volume);
   if (samples.labels_if_flat && !may_be_labels(stored, volume)) volume.labels.clear();
   volume = finish(writer, std::move(volume),
                   {.are_labels = samples.are_labels,
@@ -396,6 +425,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   volume.notes = source.notes;
   note_assumed_spacing(source, task.options, volume);
   std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
+  take_storage_order(source.storage_order, volume);
   if (source.layers)
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task);
@@ -406,6 +436,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
 }
 
 Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
+  put_in_order(writer, volume);
   const auto samples =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   std::uint64_t left_out = kind.left_out;
@@ -429,7 +460,7 @@ Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
   const bool is_closed = kind.is_segmentation && is_integer(volume.type);
   if (is_closed) {
     close_ends(writer, volume);
-  } else if (kind.is_segmentation || is_converted) {
+  } else {
     writer.shorten({volume.dims, volume.type, volume.geometry});
   }
   if (kind.is_segmentation || is_converted) {

@@ -78,7 +78,7 @@ Error with_pictures(const Error& error, const InputFile& file, const SourceVolum
                     const std::filesystem::path& scratch) {
   Remedy remedy = error.remedy();
   const bool is_plain = source.encoding == Encoding::kRaw && source.data_files.size() < 2 &&
-                        source.stored_axes == kXFastest;
+                        source.storage_order == kXFastest;
   const VolumeOfFile& volumes = source.chosen;
   if (!is_plain || volumes.run != 0 || volumes.count < remedy.choices.size()) return error;
   const double room = std::sqrt(kMostPixelsOfAll / static_cast<double>(remedy.choices.size()));

@@ -133,12 +133,12 @@ struct UnknownUnit {
 };
 
 // The axes of a lattice as they are stored, the fastest first: 0 is x, 1 is y, 2 is z.
-using StoredAxes = std::array<std::size_t, 3>;
-inline constexpr StoredAxes kXFastest = {0, 1, 2};
+using StorageOrder = std::array<std::size_t, 3>;
+inline constexpr StorageOrder kXFastest = {0, 1, 2};
 
 struct SourceVolume {
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
-  StoredAxes stored_axes = kXFastest;
+  StorageOrder storage_order = kXFastest;
   VolumeOfFile chosen;
   SampleLayout layout;
   Encoding encoding = Encoding::kRaw;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/log.h"
@@ -53,6 +54,10 @@ std::string while_reading(const ImportReport& report) {
   throw Error(ErrorCode::kInternal, "An import's response does not match its canonical file.");
 }
 
+bool are_axis_codes(std::string_view text) {
+  return text.size() == 3 && text.find_first_not_of("RLAPSI") == std::string_view::npos;
+}
+
 // A malicious file may have taken over the process, so its response is compared with the canonical
 // file.
 void check(const Volume& volume, const ImportTask& task) {
@@ -61,6 +66,7 @@ void check(const Volume& volume, const ImportTask& task) {
     if (find_note(note.code) == nullptr) throw_lying();
   }
   if (!volume::is_label_table(volume.labels)) throw_lying();
+  if (volume.stored_axes && !are_axis_codes(*volume.stored_axes)) throw_lying();
   const volume::CanonicalFile canonical(task.target);
   const volume::CanonicalHeader& header = canonical.header();
   const auto [low, high] = volume.range;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "base/clock.h"
@@ -12,6 +13,8 @@
 #include "proto/json.h"
 #include "server/jobs/library/intact_volume.h"
 #include "server/volume/canonical.h"
+#include "server/volume/geometry.h"
+#include "server/volume/sample_order.h"
 #include "server/volume/unusable.h"
 
 namespace isomesh::jobs {
@@ -26,11 +29,12 @@ bool leaves_members_open(const Error& error, const ImportOptions& options) {
 }
 
 // The id of a volume: the digest of what its upload says. It has a key if that concerns a person:
-// without one, anyone who sees an id, for instance in a log, could test whose it is. The format and
-// the names of files say nothing of the volume.
+// without one, anyone who sees an id, for instance in a log, could test whose it is. The format,
+// the order of axes and the names of files say nothing of the volume.
 std::string id_of(Volume volume, const std::string& key) {
   volume.name.reset();
   volume.format.clear();
+  volume.stored_axes.reset();
   volume.ignored.clear();
   const std::string said = to_full_json(volume);
   return volume.dicom ? to_hex(hmac_sha256(key, said)) : sha256_of(said);
@@ -67,15 +71,46 @@ volume::AxisOrder take_orientation(std::vector<Note>& notes) {
   return *order;
 }
 
-// Makes the volume what an upload of these samples with the other geometry would give, and a note.
+// The directions in which the indices of the uploaded file increase, if those of a canonical volume
+// increase in the directions `codes`.
+std::string codes_of_file(const std::string& file, const std::string& codes) {
+  constexpr std::string_view kForward = "LPS";
+  constexpr std::string_view kBackward = "RAI";
+  const auto opposite = [&](char letter) {
+    const std::size_t at = kForward.find(letter);
+    return at < kForward.size() ? kBackward[at] : kForward[kBackward.find(letter)];
+  };
+  std::string result;
+  for (const char letter : file) {
+    const std::size_t at = kForward.find(letter);
+    result += at < kForward.size() ? codes.at(at) : opposite(codes.at(kBackward.find(letter)));
+  }
+  return result;
+}
+
+// The sum of two changes of the orientation. The second one names the axes of a copy. These are
+// those of the patient, as they are in the first volume. Copies of older versions kept the order of
+// their samples, so their axes were turned by the first change.
+volume::AxisOrder sum_of(const volume::AxisOrder& first, const volume::AxisOrder& second,
+                         const Geometry& copy) {
+  return volume::canonical_order(copy) == volume::kFilesOrder ? volume::in_turn(second, first)
+                                                              : volume::in_turn(first, second);
+}
+
+// Gives the lattice of the volume its new directions, and adds a note. The samples are still in the
+// order of the old ones.
 void turn(Volume& volume, const volume::AxisOrder& order) {
   volume.id.clear();
   volume.created.clear();
+  const Geometry before = volume.geometry;
   volume.geometry = volume::reoriented(volume.dims, volume.geometry, order);
   if (const auto fault = volume::find_fault(volume.dims, volume.geometry)) {
     volume::throw_unusable("In this orientation, " + fault->message);
   }
-  const volume::AxisOrder total = volume::in_turn(take_orientation(volume.notes), order);
+  const volume::AxisOrder total = sum_of(take_orientation(volume.notes), order, before);
+  if (volume.stored_axes) {
+    volume.stored_axes = codes_of_file(*volume.stored_axes, volume::axis_codes(volume.geometry));
+  }
   // A volume without these members of DICOM does not become the first one again.
   if (volume.dicom || total != volume::kFilesOrder) {
     volume.notes.push_back(note_of(
@@ -88,13 +123,12 @@ void turn(Volume& volume, const volume::AxisOrder& order) {
   volume.dicom->instances.clear();
 }
 
-// Writes a canonical file of the same samples with another geometry.
-void copy_samples(const volume::CanonicalFile& from, const Geometry& geometry,
+// Writes a canonical file of the same samples for the volume, whose geometry is another one. Puts
+// its axes in order.
+void copy_samples(const volume::CanonicalFile& from, Volume& volume,
                   const std::filesystem::path& path, const std::stop_token& stop) {
   constexpr std::size_t kCopiedAtOnce = std::size_t{4} << 20;
-  volume::CanonicalHeader header = from.header();
-  header.geometry = geometry;
-  volume::CanonicalWriter writer(path, header);
+  volume::CanonicalWriter writer(path, from.header());
   std::span<std::byte> rest = writer.samples();
   std::uint64_t offset = 0;
   while (!rest.empty()) {
@@ -104,6 +138,11 @@ void copy_samples(const volume::CanonicalFile& from, const Geometry& geometry,
     offset += piece.size();
     rest = rest.subspan(piece.size());
   }
+  const volume::AxisOrder order = volume::canonical_order(volume.geometry);
+  volume::put_in_order(writer.samples(), bytes_per_sample(volume.type), volume.dims, order);
+  volume.geometry = volume::canonical_geometry(volume.dims, volume.geometry);
+  volume.dims = volume::in_order(volume.dims, order);
+  writer.shorten({volume.dims, volume.type, volume.geometry});
 }
 
 }  // namespace
@@ -176,6 +215,7 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   blobs_.mark_named(blob.key);
   // These are of the files of this upload.
   stored.format = std::move(volume.format);
+  stored.stored_axes = std::move(volume.stored_axes);
   stored.ignored = std::move(volume.ignored);
   return {std::move(stored), is_new};
 }
@@ -187,7 +227,7 @@ std::pair<Volume, bool> VolumeLibrary::reorient(const std::string& owner, const 
   const store::ScratchFolder scratch(folder_.scratch());
   runner_.until_stopped({}, [&](const std::stop_token& stop) {
     const store::LocalBlob samples = intact_volume(blobs_, volume.samples, stop);
-    copy_samples(volume::CanonicalFile(samples.path), volume.geometry, canonical_in(scratch), stop);
+    copy_samples(volume::CanonicalFile(samples.path), volume, canonical_in(scratch), stop);
   });
   return keep(owner, std::move(volume), scratch, {});
 }

@@ -74,11 +74,12 @@ class VolumeLibrary {
     return volumes_.rename(owner, id, name);
   }
 
-  // Stores a flipped or turned copy of the owner's volume, as volume::reoriented makes it, with a
-  // note on all changes since its upload. The copy of a DICOM volume refers neither to the images
-  // nor to their frame of reference: its positions are others. Second: false if the owner already
-  // had it. Throws Error kNotFound, kGone, kOutOfSpace; kUnusableVolume if the volume is damaged or
-  // cannot be turned; and as ImportRunner::until_stopped does.
+  // Stores a flipped or turned copy of the owner's volume, as volume::reoriented makes it, with its
+  // axes in the canonical order and a note on all changes since its upload. The copy of a DICOM
+  // volume refers neither to the images nor to their frame of reference: its positions are others.
+  // Second: false if the owner already had it. Throws Error kNotFound, kGone, kOutOfSpace;
+  // kUnusableVolume if the volume is damaged or cannot be turned; and as
+  // ImportRunner::until_stopped does.
   std::pair<Volume, bool> reorient(const std::string& owner, const std::string& id,
                                    const volume::AxisOrder& order);
 

@@ -1,9 +1,13 @@
 #include "tests/unit/import/files.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
+
+#include "server/volume/geometry.h"
+#include "server/volume/sample_order.h"
 
 namespace isomesh::import::test {
 
@@ -17,12 +21,42 @@ std::size_t Folder::entries() const {
   return static_cast<std::size_t>(std::distance(begin(all), end(all)));
 }
 
+namespace {
+
+// The order that undoes the canonical one.
+volume::AxisOrder files_order(const std::string& stored_axes) {
+  volume::AxisOrder order = {};
+  for (std::size_t axis = 0; axis < order.size(); ++axis) {
+    const std::size_t same = std::string("LPS").find(stored_axes[axis]);
+    const std::size_t opposite = std::string("RAI").find(stored_axes[axis]);
+    order[axis] = same < 3 ? static_cast<int>(same) + 1 : -static_cast<int>(opposite) - 1;
+  }
+  return order;
+}
+
+}  // namespace
+
+Outcome in_files_order(Outcome outcome) {
+  Volume& volume = outcome.volume;
+  const volume::AxisOrder order = files_order(volume.stored_axes.value());
+  std::span<std::byte> bytes = std::as_writable_bytes(std::span(outcome.canonical));
+  volume::put_in_order(bytes.subspan(kHeaderBytes), bytes_per_sample(volume.type), volume.dims,
+                       order);
+  volume.geometry = volume::in_order(volume.dims, volume.geometry, order);
+  constexpr double kRounding = 1e9;
+  for (double& place : volume.geometry.origin)
+    place = std::round(place * kRounding) / kRounding + 0;
+  volume.dims = volume::in_order(volume.dims, order);
+  return outcome;
+}
+
 Outcome outcome_of(const std::filesystem::path& target,
                    const std::function<Volume(const std::filesystem::path& target)>& import) {
   Outcome outcome;
   try {
     outcome.volume = import(target);
-    outcome.canonical = read_file(target);
+    outcome.canonical = outcome.stored = read_file(target);
+    outcome = in_files_order(std::move(outcome));
   } catch (const Error& error) {
     outcome.code = error.code();
     outcome.error = error.what();

@@ -34,10 +34,12 @@ class Folder {
 
 using volume::kHeaderBytes;
 
-// Result of an import: the volume and its canonical file, or the error.
+// Result of an import, or the error. Tests compare with what a file says, so sizes, geometry and
+// samples are in the order of its axes.
 struct Outcome {
   Volume volume;
-  std::string canonical;  // bytes of the whole file
+  std::string canonical;  // header of the canonical file, and the samples in the file's order
+  std::string stored;     // the canonical file as it is
   std::string error;      // empty when it was imported
   ErrorCode code = ErrorCode::kInternal;
   Remedy remedy;  // what the refusal offers
@@ -45,6 +47,9 @@ struct Outcome {
   bool imported() const { return error.empty(); }
   std::string_view sample_bytes() const { return std::string_view(canonical).substr(kHeaderBytes); }
 };
+
+// Undoes the canonical order of axes.
+Outcome in_files_order(Outcome outcome);
 
 // Runs an import that is given a target; keeps what came of it.
 Outcome outcome_of(const std::filesystem::path& target,

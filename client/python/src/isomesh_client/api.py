@@ -50,7 +50,9 @@ class Volume(TypedDict):
     name: Optional[str]
     #: The format of the first upload of this volume.
     format: VolumeFormat
-    #: The number of samples along x, y and z.
+    #: The number of samples along x, y and z. These are in the order of the patient, whatever the
+    #: order in the file (stored_axes): x increases towards the left, y towards the back, z towards
+    #: the head, as nearly as the directions allow.
     dims: Sequence[int]
     type: SampleType
     #: Millimetres between samples along each axis. Along z it is the distance from slice to slice,
@@ -61,6 +63,10 @@ class Volume(TypedDict):
     #: Row-major. The columns are the unit vectors of x, y and z. They are perpendicular, except
     #: that a tilted gantry shears z.
     direction: Sequence[float]
+    #: The directions in which the first, second and third index of the uploaded file increase, as
+    #: letters for right or left, anterior or posterior, superior or inferior: RAS for most NIfTI
+    #: files. Volumes of older servers lack it.
+    stored_axes: NotRequired[str]
     #: The smallest and the largest sample.
     range: Sequence[float]
     #: Otsu's threshold.

@@ -1,0 +1,20 @@
+// Moves the samples of a volume into another order of axes.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "server/volume/geometry.h"
+
+namespace isomesh::volume {
+
+// Puts samples with these sizes into `order`, in place: afterwards axis a is the present axis
+// |order[a]|, reversed if the number is negative. `samples` has them with the first axis fastest,
+// of 1, 2, 4 or 8 bytes each. Reads and writes all samples once to reverse axes, and two or three
+// times to exchange axes. Takes the memory of a slice, of at most 64 MiB, and a bit for each row.
+void put_in_order(std::span<std::byte> samples, std::size_t bytes_per_sample,
+                  const std::array<std::uint32_t, 3>& dims, const AxisOrder& order);
+
+}  // namespace isomesh::volume

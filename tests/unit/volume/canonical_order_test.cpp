@@ -1,0 +1,239 @@
+// The canonical order of axes and the numbers of the canonical geometry.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/volume/geometry.h"
+#include "server/volume/sample_order.h"
+
+namespace isomesh::volume::test {
+namespace {
+
+using Dims = std::array<std::uint32_t, 3>;
+using Direction = std::array<double, 9>;
+
+// All ways in which a file may store a lattice: any axis first, from either end.
+std::vector<AxisOrder> storages() {
+  std::vector<AxisOrder> orders;
+  AxisOrder axes = kFilesOrder;
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      AxisOrder order = axes;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if ((signs >> axis & 1U) != 0) order[axis] = -order[axis];
+      }
+      orders.push_back(order);
+    }
+  } while (std::ranges::next_permutation(axes).found);
+  return orders;
+}
+
+double determinant(const Direction& m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+Direction rotation(double angle, Vector3 axis) {
+  const double length = std::hypot(axis[0], axis[1], axis[2]);
+  for (double& part : axis) part /= length;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  const auto& [x, y, z] = axis;
+  return {c + x * x * (1 - c),     x * y * (1 - c) - z * s, x * z * (1 - c) + y * s,
+          y * x * (1 - c) + z * s, c + y * y * (1 - c),     y * z * (1 - c) - x * s,
+          z * x * (1 - c) - y * s, z * y * (1 - c) + x * s, c + z * z * (1 - c)};
+}
+
+// As a file holds the lattice whose affine matrix is in single precision.
+Geometry in_single_precision(const Geometry& geometry) {
+  const auto single = [](Vector3 numbers) {
+    for (double& number : numbers) number = static_cast<float>(number);
+    return numbers;
+  };
+  return normalised(geometry_of(
+      single(geometry.origin),
+      {single(step_of(geometry, 0)), single(step_of(geometry, 1)), single(step_of(geometry, 2))}));
+}
+
+// The lattices of the tests: along the axes, oblique in any way, halfway between axes, sheared, and
+// left-handed.
+std::vector<Geometry> lattices() {
+  constexpr double kQuarter = std::numbers::pi / 4;
+  std::vector<Geometry> all = {
+      {.origin = {-50.3, 12.7, 0.05}, .spacing = {0.7, 0.8, 1.5}},
+      {.spacing = {0.7, 0.8, 1.5}, .direction = rotation(kQuarter, {0, 0, 1})},
+      {.spacing = {1, 1, 1}, .direction = rotation(kQuarter, {0, 1, 0})},
+      {.spacing = {1, 2, 3}, .direction = rotation(kQuarter, {1, 1, 0})},
+      // All three axes are equally near.
+      {.spacing = {1, 1, 2}, .direction = rotation(std::numbers::pi / 3, {1, 1, 1})},
+  };
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> number(-1, 1);
+  for (int at = 0; at < 40; ++at) {
+    Geometry oblique = {.origin = {300 * number(random), 300 * number(random), 9 * number(random)},
+                        .spacing = {1.2 + number(random), 1.2 + number(random), 2.7},
+                        .direction = rotation(3 * number(random), {number(random), 1, 0.3})};
+    if (at % 4 == 0) {  // a skewed lattice, as of a tilted gantry
+      const double shear = std::sin(0.4 * number(random));
+      for (std::size_t row = 0; row < 3; ++row) {
+        double& part = oblique.direction[row * 3 + 2];
+        part = part * std::sqrt(1 - shear * shear) + shear * oblique.direction[row * 3 + 1];
+      }
+    }
+    all.push_back(oblique);
+  }
+  return all;
+}
+
+constexpr Dims kDims = {181, 512, 33};
+
+TEST(CanonicalOrder, IsThatOfThePatientForAllStoragesAlongItsAxes) {
+  const Geometry patient = {.origin = {-9, 4, 7}, .spacing = {0.7, 0.8, 1.5}};
+  for (const AxisOrder& storage : storages()) {
+    const Geometry stored = in_order(kDims, patient, storage);
+    const Dims dims = in_order(kDims, storage);
+    const AxisOrder order = canonical_order(stored);
+    EXPECT_EQ(in_order(dims, order), kDims) << to_string(storage);
+    EXPECT_EQ(canonical_geometry(dims, stored), patient) << to_string(storage);
+  }
+}
+
+TEST(CanonicalOrder, OfAnyLatticeDoesNotDependOnItsStorage) {
+  for (const Geometry& lattice : lattices()) {
+    const Geometry expected = canonical_geometry(kDims, lattice);
+    const Dims dims = in_order(kDims, canonical_order(lattice));
+    for (const AxisOrder& storage : storages()) {
+      const Geometry stored = in_order(kDims, lattice, storage);
+      const Dims stored_dims = in_order(kDims, storage);
+      EXPECT_EQ(in_order(stored_dims, canonical_order(stored)), dims) << to_string(storage);
+      EXPECT_EQ(canonical_geometry(stored_dims, stored), expected) << to_string(storage);
+    }
+  }
+}
+
+// An independent look at the rule: no right-handed order follows the patient better.
+TEST(CanonicalOrder, IsRightHandedAndNearestToThePatient) {
+  const auto sum = [](const Direction& d) { return d[0] + d[4] + d[8]; };
+  for (const Geometry& lattice : lattices()) {
+    const Geometry canonical = canonical_geometry(kDims, lattice);
+    EXPECT_GT(determinant(canonical.direction), 0);
+    for (const AxisOrder& storage : storages()) {
+      const Geometry other = in_order(kDims, lattice, storage);
+      if (determinant(other.direction) < 0) continue;
+      EXPECT_LE(sum(other.direction), sum(canonical.direction) + 1.1e-4);
+    }
+  }
+}
+
+TEST(CanonicalOrder, IsKeptByARepetition) {
+  for (const Geometry& lattice : lattices()) {
+    const Geometry once = canonical_geometry(kDims, lattice);
+    const Dims dims = in_order(kDims, canonical_order(lattice));
+    EXPECT_EQ(canonical_order(once), kFilesOrder);
+    EXPECT_EQ(canonical_geometry(dims, once), once);
+  }
+}
+
+TEST(CanonicalOrder, LeavesTheCornersOfALatticeInTheirPlaces) {
+  for (const Geometry& lattice : lattices()) {
+    const AxisOrder order = canonical_order(lattice);
+    const Geometry before = in_order(kDims, lattice, order);
+    const Geometry after = canonical_geometry(kDims, lattice);
+    const Dims dims = in_order(kDims, order);
+    // Single precision has no closer numbers; all of these lattices are within 2 m.
+    const double most = 1e-4 * std::ranges::min(after.spacing) + 2000 * 0x1p-23;
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      Vector3 between = {};
+      for (std::size_t row = 0; row < 3; ++row)
+        between[row] = before.origin[row] - after.origin[row];
+      for (int axis = 0; axis < 3; ++axis) {
+        const double steps =
+            (corner >> axis & 1U) == 0 ? 0 : dims[static_cast<std::size_t>(axis)] - 1.0;
+        for (std::size_t row = 0; row < 3; ++row) {
+          between[row] += steps * (step_of(before, axis)[row] - step_of(after, axis)[row]);
+        }
+      }
+      EXPECT_LE(std::hypot(between[0], between[1], between[2]), most);
+    }
+  }
+}
+
+// nibabel computes the other end of an axis from numbers in single precision, and stores it so.
+TEST(CanonicalOrder, FindsTheNumbersThatSinglePrecisionRounded) {
+  for (const double spacing : {0.5, 0.7, 0.8, 0.9, 1.0, 1.2, 1.5, 2.0}) {
+    const Geometry chosen = {.origin = {-50.3, -127.45, 31.2}, .spacing = {spacing, spacing, 1.5}};
+    const Dims dims = {256, 256, 180};
+    const Geometry first = in_single_precision(chosen);
+    EXPECT_EQ(canonical_geometry(dims, first), chosen);
+    for (const AxisOrder& storage : storages()) {
+      const Geometry stored = in_single_precision(in_order(dims, first, storage));
+      EXPECT_EQ(canonical_geometry(in_order(dims, storage), stored), chosen)
+          << spacing << ' ' << to_string(storage);
+    }
+  }
+}
+
+TEST(CanonicalOrder, LeavesDecimalsOfAHeaderAlone) {
+  const Geometry text = {.origin = {-171.699219, -324.199219, -1043.75},
+                         .spacing = {0.683594, 0.683594, 1.25}};
+  EXPECT_EQ(canonical_geometry({512, 512, 200}, text), text);
+}
+
+TEST(CanonicalOrder, IsToldByLettersAsOfNibabel) {
+  EXPECT_EQ(axis_codes({}), "LPS");
+  const auto codes = [](const AxisOrder& storage) {
+    return axis_codes(in_order(kDims, {}, storage));
+  };
+  EXPECT_EQ(codes({-1, -2, 3}), "RAS");
+  EXPECT_EQ(codes({1, -2, 3}), "LAS");
+  EXPECT_EQ(codes({-2, 3, 1}), "ASL");
+  EXPECT_EQ(codes({-3, -1, -2}), "IRA");
+  EXPECT_EQ(codes({2, -3, 1}), "PIL");
+}
+
+// Sample (i,j,k) of the result is compared with the one that the order names.
+template <class Sample>
+void expect_in_order(const Dims& dims) {
+  std::vector<Sample> samples(std::size_t{dims[0]} * dims[1] * dims[2]);
+  std::mt19937 random(3);
+  std::ranges::generate(samples, [&] { return static_cast<Sample>(random()); });
+  for (const AxisOrder& order : storages()) {
+    std::vector<Sample> moved = samples;
+    put_in_order(std::as_writable_bytes(std::span(moved)), sizeof(Sample), dims, order);
+    const Dims after = in_order(dims, order);
+    std::vector<Sample> expected;
+    for (std::size_t k = 0; k < after[2]; ++k) {
+      for (std::size_t j = 0; j < after[1]; ++j) {
+        for (std::size_t i = 0; i < after[0]; ++i) {
+          const std::array<std::size_t, 3> place = {i, j, k};
+          std::array<std::size_t, 3> from = {};
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto source = static_cast<std::size_t>(std::abs(order[axis]) - 1);
+            from[source] = order[axis] < 0 ? dims[source] - 1 - place[axis] : place[axis];
+          }
+          expected.push_back(samples[from[0] + dims[0] * (from[1] + dims[1] * from[2])]);
+        }
+      }
+    }
+    ASSERT_EQ(moved, expected) << to_string(order);
+  }
+}
+
+TEST(SampleOrder, MovesSamplesOfAllSizes) {
+  for (const Dims& dims : {Dims{1, 1, 1}, Dims{5, 1, 3}, Dims{3, 67, 2}, Dims{70, 65, 3},
+                           Dims{16, 32, 17}, Dims{2, 9, 81}}) {
+    expect_in_order<std::uint8_t>(dims);
+    expect_in_order<std::uint16_t>(dims);
+    expect_in_order<std::uint32_t>(dims);
+    expect_in_order<std::uint64_t>(dims);
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::volume::test
