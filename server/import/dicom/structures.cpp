@@ -88,9 +88,9 @@ std::string way_out(const StructureSet& set, const ContourGrid& grid,
                     const ImportOptions& options) {
   if (options.spacing) return "A smaller spacing=X,Y,Z (mm) draws smaller structures.";
   const auto& [x, y, z] = grid.geometry.spacing;
-  return "spacing=X,Y,Z (mm), such as " + in_mm(x) + ',' + in_mm(y) + ',' +
+  return "Add spacing=X,Y,Z (mm), such as " + in_mm(x) + ',' + in_mm(y) + ',' +
          in_mm(usual_distance(set).value_or(z)) +
-         ", draws on a grid of its own, around all contours and parallel to their planes.";
+         ", to draw on a grid of its own, around all contours and parallel to their planes.";
 }
 
 // Draws all structures of a set, slice by slice.
@@ -200,7 +200,8 @@ void add_notes(const StructureSet& set, const Drawing& drawing, const std::strin
   add(set.empty, "structure", "without closed contours");
   add(lost, "structure", "with no sample on the grid");
   add(cut.size(), "structure",
-      "where the grid ends before the contours do (label " + in_words(cut) + ')');
+      "where the grid ends before the contours do (" +
+          std::string(cut.size() == 1 ? "label " : "labels ") + in_words(cut) + ')');
   if (!skipped.empty()) {
     std::string detail = "Not drawn: " + skipped + '.';
     if (tilted > 0 || lost > 0 || !cut.empty()) detail += ' ' + way_out;

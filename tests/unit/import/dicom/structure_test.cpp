@@ -313,7 +313,7 @@ TEST(DicomStructures, TellThatTheGridCutsThem) {
     EXPECT_THAT(
         note_detail(outcome, NoteCode::kContoursSkipped),
         AllOf(HasSubstr("1 structure where the grid ends before the contours do (label 7)"),
-              HasSubstr("spacing=X,Y,Z (mm), such as 1,1,2, draws"), Not(HasSubstr("cut"))));
+              HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,2, to draw"), Not(HasSubstr("cut"))));
     // The remedy has all of it.
     const Outcome all = imported(draw_alone(structure_set(set), {1, 1, 2}));
     EXPECT_EQ(voxels_of(all, 7), whole);
@@ -331,8 +331,9 @@ TEST(DicomStructures, TellNothingOfACutThatLeavesNoSampleOut) {
 
 TEST(DicomStructures, BeyondTheGridOrOnOtherPlanesAreOfferedAGridOfTheirOwn) {
   const std::vector<TestStructure> beyond = {{.contours = boxes(195.5, 4.5, 199.5, 8.5, kHeights)}};
-  EXPECT_THAT(draw(beyond).error, AllOf(HasSubstr("No contour"), HasSubstr("of its images"),
-                                        HasSubstr("spacing=X,Y,Z (mm), such as 1,1,2, draws")));
+  EXPECT_THAT(draw(beyond).error,
+              AllOf(HasSubstr("No contour"), HasSubstr("of its images"),
+                    HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,2, to draw")));
   EXPECT_EQ(voxels_of(imported(draw_alone(structure_set(beyond), {1, 1, 2})), 1), 4U * 4 * 3);
   // Sagittal planes, 1.5 mm apart.
   std::vector<TestContour> sagittal;
@@ -340,7 +341,7 @@ TEST(DicomStructures, BeyondTheGridOrOnOtherPlanesAreOfferedAGridOfTheirOwn) {
     sagittal.push_back({{{x, 2.5, 2}, {x, 8.5, 2}, {x, 8.5, 10}, {x, 2.5, 10}}});
   }
   const std::vector<TestStructure> tilted = {{.contours = sagittal}};
-  EXPECT_THAT(draw(tilted).error, HasSubstr("spacing=X,Y,Z (mm), such as 1,1,1.5, draws"));
+  EXPECT_THAT(draw(tilted).error, HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,1.5, to draw"));
   EXPECT_EQ(voxels_of(imported(draw_alone(structure_set(tilted), {1, 1, 1.5})), 1), 6U * 8 * 3);
   // Between all samples of the grid that was asked for.
   const Points triangle = {{4.2, 4.4, 2}, {4.3, 4.2, 2}, {4.4, 4.4, 2}};
