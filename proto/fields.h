@@ -271,6 +271,9 @@ void visit(Is<WallSummary> auto& self, auto&& field) {
   field("a", self.a);
   field("b", self.b);
   field("area_mm2", self.area_mm2);
+  if (is_told(self, self.faces.has_value())) {
+    field("faces", self.faces);
+  }
   field("a_name", self.a_name);
   field("b_name", self.b_name);
 }
@@ -312,6 +315,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   }
   if (is_told(self, self.walls_count.has_value())) {
     field("walls_count", self.walls_count);
+  }
+  if (is_told(self, self.edge_contacts_count.has_value())) {
+    field("edge_contacts_count", self.edge_contacts_count);
   }
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(self)>>) {
     field("label_list", self.label_list);  // written by to_record() alone

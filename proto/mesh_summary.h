@@ -144,6 +144,9 @@ struct WallSummary {
   std::int64_t a = 0;
   std::optional<std::int64_t> b = {};  // greater than `a`; empty: the background
   double area_mm2 = 0;
+  // How many faces voxels of the two share: 0 where they meet at edges and corners only. None of a
+  // job of an older server.
+  std::optional<std::uint64_t> faces = {};
   std::optional<std::string> a_name = {};
   std::optional<std::string> b_name = {};
 
@@ -318,8 +321,11 @@ struct MeshSummary {
   std::optional<std::uint64_t> labels_count = {};
   std::optional<LabelListFile> label_list = {};
   static constexpr std::size_t kMostListedLabels = 256;
-  // For a job by labels. Only records name the file of the walls; no walls have none.
+  // For a job by labels: the walls of labels that share faces of voxels, and the others. The latter
+  // are not counted, and among the former, in jobs of older servers. Only records name the file of
+  // both; no walls have none.
   std::optional<std::uint64_t> walls_count = {};
+  std::optional<std::uint64_t> edge_contacts_count = {};
   std::optional<LabelListFile> wall_list = {};
   std::optional<MeshCertificate> certificate = {};
   std::optional<Thickness> thickness = {};  // if requested

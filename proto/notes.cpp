@@ -89,8 +89,9 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .is_in_mesh = true},
     {.code = NoteCode::kContoursSkipped,
      .name = "contours-skipped",
-     .meaning = "A DICOM structure set has contours or structures that were not drawn. The detail "
-                "says how many and why.",
+     .meaning =
+         "A DICOM structure set has contours or structures that were not drawn, or not beyond "
+         "the grid. The detail says how many and why.",
      .is_in_mesh = true},
     {.code = NoteCode::kContoursInterpolated,
      .name = "contours-interpolated",

@@ -212,7 +212,7 @@ int labels(Client& client, const Options& options) {
 
 int walls(Client& client, const Options& options) {
   const Job job = client.job(job_id(client, options.id));
-  const std::vector<WallSummary> walls = client.job_walls(job.id);
+  const std::vector<WallSummary> walls = client.job_walls(job.id, options.edge_contacts);
   options.json ? print_json(to_json(walls)) : print(wall_list(walls, unit_of(client, job)));
   return kDone;
 }

@@ -202,8 +202,11 @@ class Parser {
     add_number<std::int64_t>(labels, "--background",
                              "Value of samples without a label (default: 0)",
                              [&](std::int64_t value) { options_.background = value; });
-    add_id(command(Command::kWalls, "walls", "List the areas where the labels of a job touch"),
-           options_, "JOB");
+    CLI::App& walls =
+        command(Command::kWalls, "walls", "List the areas where the labels of a job touch");
+    add_id(walls, options_, "JOB");
+    walls.add_flag("--edge-contacts", options_.edge_contacts,
+                   "List also pairs that meet at edges of voxels only");
     add_commands();
     add_descriptions();
   }

@@ -76,6 +76,7 @@ struct Options {
   bool with_jobs = false;                    // erase: also the ended jobs on the volumes
   std::optional<std::int64_t> label;         // fetch
   std::int64_t background = 0;               // labels
+  bool edge_contacts = false;                // walls
   std::string kind;                          // ids: volumes, jobs, or an added kind
   const AddedCommand* added = nullptr;       // if it is one
   const AddedIds* added_ids = nullptr;       // ids: of an added kind

@@ -417,14 +417,16 @@ std::string label_list(const VolumeLabels& labels) {
 }
 
 std::string wall_list(const std::vector<WallSummary>& walls, const LengthUnit& unit) {
-  Rows rows = {{"label", "name", "label", "name", Units(unit).square()}};
+  Rows rows = {{"label", "name", "label", "name", Units(unit).square(), "faces"}};
   for (const WallSummary& wall : walls) {
     const std::string other = wall.b ? std::to_string(*wall.b) : "";
     rows.push_back({std::to_string(wall.a), wall.a_name.value_or(""), other,
-                    wall.b ? wall.b_name.value_or("") : "background", fixed(wall.area_mm2, 1)});
+                    wall.b ? wall.b_name.value_or("") : "background", fixed(wall.area_mm2, 1),
+                    wall.faces ? grouped(*wall.faces) : ""});
   }
-  return in_columns({Align::kRight, Align::kLeft, Align::kRight, Align::kLeft, Align::kRight},
-                    rows);
+  return in_columns(
+      {Align::kRight, Align::kLeft, Align::kRight, Align::kLeft, Align::kRight, Align::kRight},
+      rows);
 }
 
 std::string with_origin(const std::string& json, const Origin& origin) {

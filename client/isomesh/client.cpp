@@ -376,8 +376,10 @@ std::vector<LabelSummary> Client::job_labels(const std::string& id) {
   return impl_->all_pages(job_path(id) + "/labels", labels_from_json);
 }
 
-std::vector<WallSummary> Client::job_walls(const std::string& id) {
-  return impl_->all_pages(job_path(id) + "/walls", walls_from_json);
+std::vector<WallSummary> Client::job_walls(const std::string& id, bool edge_contacts) {
+  Query query;
+  if (edge_contacts) query.emplace_back("edge_contacts", "true");
+  return impl_->all_pages(job_path(id) + "/walls", walls_from_json, query);
 }
 
 std::string Client::report(const std::string& id) {

@@ -212,8 +212,9 @@ class Client {
   std::vector<LabelSummary> job_labels(const std::string& id);
 
   // The areas where two labels of a finished job touch, or one is next to the background, ascending
-  // by labels. Throws as job_labels() does.
-  std::vector<WallSummary> job_walls(const std::string& id);
+  // by labels; with `edge_contacts` also of pairs that share no face of a voxel. Throws as
+  // job_labels() does.
+  std::vector<WallSummary> job_walls(const std::string& id, bool edge_contacts = false);
 
   // The report on a finished job as JSON: parameters, volume, mesh, versions. Throws kNotReady, the
   // job's own error or kCancelled as fetch() does.

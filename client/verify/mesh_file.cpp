@@ -208,9 +208,11 @@ Surface read_surface(std::string_view bytes) try {
   const bool is_glb = bytes.starts_with("glTF");
   const bool is_ply = bytes.starts_with("ply\n");
   Surface surface = is_glb ? read_glb(bytes) : is_ply ? read_ply(bytes) : read_stl(bytes);
-  // As isomesh says it in the header of an STL and in a comment of a PLY.
+  // As isomesh says it in the header of an STL and in a comment of a PLY; ", RAS" in older PLY
+  // files.
   const std::string_view head = bytes.substr(0, is_ply ? bytes.find("end_header") : 80);
-  const bool is_ras = !is_glb && head.find(is_ply ? ", RAS\n" : "SPACE=RAS") != head.npos;
+  const auto tells = [&](std::string_view words) { return head.find(words) != head.npos; };
+  const bool is_ras = !is_glb && (tells("SPACE=RAS") || (is_ply && tells(", RAS\n")));
   constexpr double kMost = 1e30;  // products of squares stay finite
   for (Vec& point : surface.points) {
     if (is_ras) point = {-point[0], -point[1], point[2]};

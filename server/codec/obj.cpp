@@ -84,8 +84,7 @@ void encode_obj_labels(const LabelledSurface& surface, const FileContent& conten
 std::optional<mesh::Topology> encode_obj(const FileContent& content, const mesh::Context& context,
                                          const Sink& sink) {
   context.throw_if_stopped();
-  put_text(sink, "# isomesh, " + std::string(content.unit.name) + ", " +
-                     std::string(letters_of(content.space)) + '\n');
+  put_text(sink, "# isomesh, " + unit_and_space(content.unit, content.space) + '\n');
   if (content.labels != nullptr) {
     encode_obj_labels(*content.labels, content, context, sink);
     return std::nullopt;

@@ -42,8 +42,7 @@ std::optional<mesh::Topology> encode_off(const FileContent& content, const mesh:
         write_numbers(std::uint64_t{a}, std::uint64_t{b}, std::uint64_t{c}, text));
   });
   // A comment before the last face stops NiiVue, gmsh, meshio or trimesh.
-  put_text(sink, "# isomesh, " + std::string(content.unit.name) + ", " +
-                     std::string(letters_of(content.space)) + '\n');
+  put_text(sink, "# isomesh, " + unit_and_space(content.unit, content.space) + '\n');
   return std::nullopt;
 }
 

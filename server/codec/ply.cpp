@@ -32,10 +32,10 @@ std::byte* write_ply_face(const mesh::Triangle& face, std::byte* out) {
 std::string ply_header(const FileContent& content, const std::string& comments,
                        std::size_t vertices, const std::string& properties, std::size_t faces) {
   return "ply\nformat binary_little_endian 1.0\ncomment isomesh, " +
-         std::string(content.unit.name) + ", " + std::string(letters_of(content.space)) + '\n' +
-         comments + "element vertex " + std::to_string(vertices) +
-         "\nproperty float x\nproperty float y\nproperty float z\n" + properties + "element face " +
-         std::to_string(faces) + "\nproperty list uchar uint vertex_indices\nend_header\n";
+         unit_and_space(content.unit, content.space) + '\n' + comments + "element vertex " +
+         std::to_string(vertices) + "\nproperty float x\nproperty float y\nproperty float z\n" +
+         properties + "element face " + std::to_string(faces) +
+         "\nproperty list uchar uint vertex_indices\nend_header\n";
 }
 
 // A vertex of a label's own surface.

@@ -1,8 +1,10 @@
 // Coordinate spaces of files. Private to this folder and its subfolders.
 #pragma once
 
+#include <string>
 #include <string_view>
 
+#include "proto/notes.h"
 #include "proto/types.h"
 #include "server/mesh/mesh.h"
 
@@ -22,5 +24,12 @@ inline mesh::Reach in_space(const mesh::Reach& box, Space space) {
 }
 
 constexpr std::string_view letters_of(Space space) { return space == Space::kLps ? "LPS" : "RAS"; }
+
+// The unit and the space of the coordinates, for a header, a title or the first comment of a file:
+// "millimetres, SPACE=LPS". 3D Slicer finds "SPACE=" there in STL, VTK, PLY and OBJ, and takes
+// files without it for LPS (vtkMRMLModelStorageNode.cxx).
+inline std::string unit_and_space(const LengthUnit& unit, Space space) {
+  return std::string(unit.name) + ", SPACE=" + std::string(letters_of(space));
+}
 
 }  // namespace isomesh::codec

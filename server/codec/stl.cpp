@@ -51,8 +51,7 @@ std::vector<std::byte> head_of(Space space, const LengthUnit& unit, std::uint64_
                 "simplify it.");
   }
   // The header must not start with "solid": readers would assume a text file.
-  const std::string title =
-      "isomesh binary STL, " + std::string(unit.name) + ", SPACE=" + std::string(letters_of(space));
+  const std::string title = "isomesh binary STL, " + unit_and_space(unit, space);
   std::vector<std::byte> head(kHeaderBytes + 4);
   std::memcpy(head.data(), title.data(), title.size());
   const auto count = static_cast<std::uint32_t>(triangles);

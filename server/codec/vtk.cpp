@@ -33,9 +33,8 @@ std::optional<mesh::Topology> encode_vtk(const FileContent& content, const mesh:
   const std::size_t vertices = mesh.positions.size();
   const std::size_t faces = count_of(runs);
   check_signed_indices(vertices, faces, content.format);
-  // 3D Slicer reads the space from the title in the second line.
-  put_text(sink, "# vtk DataFile Version 3.0\nisomesh, " + std::string(content.unit.name) +
-                     ", SPACE=" + std::string(letters_of(content.space)) +
+  put_text(sink, "# vtk DataFile Version 3.0\nisomesh, " +
+                     unit_and_space(content.unit, content.space) +
                      "\nBINARY\nDATASET POLYDATA\nPOINTS " + std::to_string(vertices) + " float\n");
   BlockWriter writer(context, sink, vertices + faces * (content.labels == nullptr ? 1 : 2));
   writer.write(vertices, kVertexBytes, [&](std::size_t v, std::byte* out) {

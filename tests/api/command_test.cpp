@@ -206,7 +206,7 @@ TEST_F(CommandTest, AnObjOfLabelsHasItsMaterialsBesideIt) {
   EXPECT_EQ(made.status, 0) << made.errors;
   EXPECT_THAT(outputs(), ElementsAre("x.mtl", "x.obj"));
   const std::string obj = read_file(folder_ / "out/x.obj");
-  EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, LPS\nmtllib x.mtl\no label_1\nv "));
+  EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, SPACE=LPS\nmtllib x.mtl\no label_1\nv "));
   const std::string materials = read_file(folder_ / "out/x.mtl");
   EXPECT_THAT(materials, HasSubstr("newmtl label_2\nKd 1.000000 0.000000 0.501961\n"));
   EXPECT_THAT(made.output, HasSubstr("/out/x.mtl\n"));

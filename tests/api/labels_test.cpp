@@ -393,6 +393,7 @@ TEST_F(LabelsTest, HaveTheAreasOfTheirWalls) {
     areas[wall.a] += wall.area_mm2;
     if (wall.b) areas[*wall.b] += wall.area_mm2;
     all += wall.area_mm2;
+    EXPECT_GT(wall.faces, 0U);
     EXPECT_EQ(wall.a_name.value_or(""), wall.a == 7 ? "Right" : "");
     EXPECT_EQ(wall.b_name.value_or(""), wall.b == 7 ? "Right" : "");
   }

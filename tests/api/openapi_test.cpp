@@ -189,6 +189,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   by_labels.parameters.label_values[3] = {3, 4};
   by_labels.mesh->labels = {{.label = 3, .voxels = 1}};
   by_labels.mesh->walls_count = 1;
+  by_labels.mesh->edge_contacts_count = 0;
   const std::string digest(64, 'a');
   by_labels.mesh->labels[0].files[MeshFormat::kStl] = {.bytes = 1, .sha256 = digest, .href = "/x"};
   Job many_labels = by_labels;
@@ -231,7 +232,8 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"Job", to_json(by_labels)},
       {"Job", to_json(many_labels)},
       {"LabelSummaryList", to_json(by_labels.mesh->labels, "next")},
-      {"WallList", to_json(std::vector<WallSummary>{{.a = 3, .area_mm2 = 1, .a_name = "x"}}, "x")},
+      {"WallList",
+       to_json(std::vector<WallSummary>{{.a = 3, .area_mm2 = 1, .faces = 1, .a_name = "x"}}, "x")},
       {"JobParameters", to_json(by_labels.parameters)},
       {"JobList", to_json(std::vector{by_labels, many_labels})},
       {"Estimate", to_json(of_labels)},

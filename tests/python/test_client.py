@@ -220,6 +220,10 @@ class Jobs(DaemonTest):
         self.assertEqual([each["label"] for each in labels], list(range(1, 343)))
         walls = list(self.client.job_walls(job))
         self.assertEqual(len(walls), job["mesh"]["walls_count"])
+        self.assertTrue(all(each["faces"] > 0 for each in walls))
+        at_edges = [each for each in self.client.job_walls(job, edge_contacts=True) if each["faces"] == 0]
+        self.assertEqual(len(at_edges), job["mesh"]["edge_contacts_count"])
+        self.assertGreater(len(at_edges), 0)
         touching = {each[side] for each in walls for side in "ab"}
         self.assertEqual(touching, {None, *range(1, 343)})
         size = self.client.download(job, self.folder / "300.stl", label=300).stat().st_size

@@ -50,6 +50,14 @@ class Arrays(LimitedTest):
         with self.assertRaisesRegex(ValueError, "'ras' or 'lps', not 'mni'"):
             mesh.in_space("mni")
 
+    def test_the_space_of_a_file_is_read_from_its_comment(self):
+        file = self.folder / "ras.ply"
+        data = tetrahedron().in_space("ras").save(file).read_bytes()
+        self.assertIn(b"\ncomment isomesh, millimetres, SPACE=RAS\n", data)
+        for told, space in ((b"millimetres, RAS", "ras"), (b"angstrom, SPACE=RAS", "ras"), (b"millimetres, LPS", "lps")):
+            file.write_bytes(data.replace(b"millimetres, SPACE=RAS", told))
+            self.assertEqual(isomesh_client.read_ply(file).space, space)
+
     def test_bounds(self):
         self.assertEqual(tetrahedron().bounds.tolist(), [[0, 0, 0], [2, 3, 4]])
         self.assertEqual(tetrahedron().in_space("ras").bounds.tolist(), [[-2, -3, 0], [0, 0, 4]])
@@ -286,7 +294,7 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         samples[2:6, 2:10, 2:10], samples[6:10, 2:10, 2:10] = 3, 7
         mesh = self.client.mesh(samples, labels="all", label_colors={7: "#ff0080"}, formats=["obj"])
         lines = mesh.save(self.folder / "two labels.obj").read_text().splitlines()
-        self.assertEqual(lines[:3], ["# isomesh, millimetres, LPS", "mtllib two_labels.mtl", "o label_3"])
+        self.assertEqual(lines[:3], ["# isomesh, millimetres, SPACE=LPS", "mtllib two_labels.mtl", "o label_3"])
         self.assertEqual(sum(line.startswith("f ") for line in lines), len(mesh.faces))
         materials = (self.folder / "two_labels.mtl").read_text()
         self.assertIn("newmtl label_7\nKd 1.000000 0.000000 0.501961\n", materials)

@@ -215,22 +215,22 @@ void list_labels(const App& app, const Request& request, Response& response) {
   answer_tagged_json(request, response, to_json(page, next));
 }
 
-// A page of a job's walls. Its cursor is the number of those before it.
+// A page of a job's walls. Its cursor is its place in the list of all, those at edges included.
 void list_walls(const App& app, const Request& request, Response& response) {
   constexpr const char* kCursor = "walls";
-  check_known(request, {"cursor"});
+  check_known(request, {"cursor", "edge_contacts"});
   const std::int64_t begin = label_after(request, kCursor).value_or(0);
   if (begin < 0) throw wrong_cursor();
+  const bool edge_contacts = flag_of(request, "edge_contacts", false);
   const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
   check_has_mesh(job);
   for (const auto& list : {job.mesh->label_list, job.mesh->wall_list}) {
     if (list) check_intact(app, job, list->sha256);
   }
-  const auto page = jobs::walls_of(job, static_cast<std::uint64_t>(begin), app.services.blobs);
-  const std::uint64_t end = static_cast<std::uint64_t>(begin) + page.size();
-  const bool has_more = !page.empty() && end < job.mesh->walls_count.value_or(0);
-  const std::string next = has_more ? cursor_after(kCursor, std::to_string(end)) : "";
-  answer_tagged_json(request, response, to_json(page, next));
+  const auto page =
+      jobs::walls_of(job, static_cast<std::uint64_t>(begin), edge_contacts, app.services.blobs);
+  const std::string next = page.next ? cursor_after(kCursor, std::to_string(*page.next)) : "";
+  answer_tagged_json(request, response, to_json(page.walls, next));
 }
 
 // As JSON; null if it is gone or its record is damaged.

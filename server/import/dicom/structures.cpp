@@ -55,11 +55,14 @@ void choose_structure(const ImportOptions& options, StructureSet& set) {
                std::move(choices));
 }
 
+std::string in_mm(double length) {
+  constexpr double kPerMm = 1000;
+  return to_text(length * kPerMm < 1 ? length : std::round(length * kPerMm) / kPerMm);
+}
+
 [[noreturn]] void throw_no_grid(const StructureSet& set) {
   const auto distance = usual_distance(set);
-  const std::string planes =
-      distance ? " Its contours are " + to_text(std::round(*distance * 1000) / 1000) + " mm apart."
-               : "";
+  const std::string planes = distance ? " Its contours are " + in_mm(*distance) + " mm apart." : "";
   throw_unusable(
       "The DICOM structure set has no images in the upload that share its frame of reference. Add "
       "them, or add spacing=X,Y,Z (mm) for the grid on which its contours are drawn." +
@@ -78,6 +81,16 @@ ContourGrid grid_of(const StructureSet& set, const std::optional<ContourGrid>& i
   }
   if (!images) throw_no_grid(set);
   return grid_of_images(set, *images);
+}
+
+// How to draw what the grid leaves out. The set still has its points.
+std::string way_out(const StructureSet& set, const ContourGrid& grid,
+                    const ImportOptions& options) {
+  if (options.spacing) return "A smaller spacing=X,Y,Z (mm) draws smaller structures.";
+  const auto& [x, y, z] = grid.geometry.spacing;
+  return "Add spacing=X,Y,Z (mm), such as " + in_mm(x) + ',' + in_mm(y) + ',' +
+         in_mm(usual_distance(set).value_or(z)) +
+         ", to draw on a grid of its own, around all contours and parallel to their planes.";
 }
 
 // Draws all structures of a set, slice by slice.
@@ -117,6 +130,15 @@ class Drawing {
   // Structures of which a sample was drawn.
   const std::set<std::uint32_t>& drawn() const { return drawn_; }
 
+  // Those that go on beyond the grid.
+  std::vector<std::uint32_t> cut() const {
+    std::vector<std::uint32_t> labels;
+    for (const auto& [label, painter] : painters_) {
+      if (painter.is_cut() && drawn_.contains(label)) labels.push_back(label);
+    }
+    return labels;
+  }
+
   template <class Count>
   std::size_t sum(Count count) const {
     std::size_t sum = 0;
@@ -153,8 +175,20 @@ std::vector<LabelEntry> entries_of(const StructureSet& set, const std::set<std::
   return label_table(std::move(entries));
 }
 
+// "1, 2 and 3 more".
+std::string in_words(const std::vector<std::uint32_t>& labels) {
+  constexpr std::size_t kMostNamed = 10;
+  std::string text;
+  const std::size_t named = std::min(labels.size(), kMostNamed);
+  for (std::size_t n = 0; n < named; ++n) text += (n == 0 ? "" : ", ") + std::to_string(labels[n]);
+  if (labels.size() > named) text += " and " + std::to_string(labels.size() - named) + " more";
+  return text;
+}
+
 // Names stay out, because meshes carry these notes.
-void add_notes(const StructureSet& set, const Drawing& drawing, Volume& volume) {
+void add_notes(const StructureSet& set, const Drawing& drawing, const std::string& way_out,
+               Volume& volume) {
+  const std::vector<std::uint32_t> cut = drawing.cut();
   const std::size_t tilted = drawing.sum(&Painter::tilted);
   const std::size_t lost = set.structures.size() - drawing.drawn().size();
   std::string skipped;
@@ -165,8 +199,13 @@ void add_notes(const StructureSet& set, const Drawing& drawing, Volume& volume) 
   add(tilted, "contour", "not parallel to the slices");
   add(set.empty, "structure", "without closed contours");
   add(lost, "structure", "with no sample on the grid");
+  add(cut.size(), "structure",
+      "where the grid ends before the contours do (" +
+          std::string(cut.size() == 1 ? "label " : "labels ") + in_words(cut) + ')');
   if (!skipped.empty()) {
-    volume.notes.push_back(note_of(NoteCode::kContoursSkipped, "Not drawn: " + skipped + '.'));
+    std::string detail = "Not drawn: " + skipped + '.';
+    if (tilted > 0 || lost > 0 || !cut.empty()) detail += ' ' + way_out;
+    volume.notes.push_back(note_of(NoteCode::kContoursSkipped, std::move(detail)));
   }
   if (const std::size_t count = drawing.sum(&Painter::interpolated); count > 0) {
     std::string detail =
@@ -209,6 +248,7 @@ Volume import_structures(const std::filesystem::path& path,
   const ContourGrid grid = grid_of(set, images, task.options);
   Volume volume = describe(grid, file.data());
   check_limits(volume.sample_count(), SampleType::kUint8, task.limits);
+  const std::string remedy = way_out(set, grid, task.options);
   Drawing drawing(set, grid);
   for (const SampleType type : drawing.types()) {
     check_limits(volume.sample_count(), type, task.limits);
@@ -217,11 +257,12 @@ Volume import_structures(const std::filesystem::path& path,
     const auto combinations = drawing.write(type, writer.samples());
     if (!combinations) continue;
     if (drawing.drawn().empty()) {
-      throw_unusable("No contour of the DICOM structure set lies on the grid of its images.");
+      throw_unusable("No contour of the DICOM structure set lies on the grid" +
+                     std::string(task.options.spacing ? ". " : " of its images. ") + remedy);
     }
     volume.labels = combinations->entries(entries_of(set, drawing.drawn()));
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
-    add_notes(set, drawing, volume);
+    add_notes(set, drawing, remedy, volume);
     return finish(writer, volume);
   }
   throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a structure set.");

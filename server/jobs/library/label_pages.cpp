@@ -17,7 +17,6 @@ namespace {
 constexpr std::size_t kPerPage = MeshSummary::kMostListedLabels;
 constexpr std::size_t kNumberBytes = 8;
 constexpr std::size_t kEntryBytes = 2 * kNumberBytes;
-constexpr std::size_t kWallBytes = 3 * kNumberBytes;
 
 [[noreturn]] void throw_damaged() {
   throw Error(ErrorCode::kInternal, "the stored list of a job's labels or walls is damaged");
@@ -59,6 +58,70 @@ void set_addresses(const std::string& job, std::vector<LabelSummary>& labels) {
     for (auto& [format, file] : label.files) file.href = mesh_path(job, format, label.label);
   }
 }
+
+// The file of a job's walls, whose labels are told by their places.
+class WallFile {
+ public:
+  struct Page {
+    std::vector<mesh::WallArea> walls;
+    std::optional<std::uint64_t> next;
+  };
+
+  WallFile(const Job& job, const store::BlobStore& blobs)
+      : has_faces_(job.mesh->edge_contacts_count.has_value()),
+        count_(*job.mesh->walls_count + job.mesh->edge_contacts_count.value_or(0)) {
+    if (count_ == 0) return;
+    if (!job.mesh->wall_list) throw_damaged();
+    file_ = blobs.open(job.mesh->wall_list->sha256);
+    if (file_->size() / wall_bytes() != count_ || file_->size() % wall_bytes() != 0)
+      throw_damaged();
+  }
+
+  // False in jobs of older servers, which list all walls.
+  bool has_faces() const { return has_faces_; }
+
+  Page page(std::uint64_t begin, bool edge_contacts, std::uint64_t labels) const {
+    Page page;
+    for (std::uint64_t at = begin; at < count_; at += kPerPage) {
+      const auto here = read_walls(at, labels);
+      for (std::size_t n = 0; n < here.size(); ++n) {
+        if (has_faces_ && here[n].faces == 0 && !edge_contacts) continue;
+        if (page.walls.size() == kPerPage) {
+          page.next = at + n;
+          return page;
+        }
+        page.walls.push_back(here[n]);
+      }
+    }
+    return page;
+  }
+
+ private:
+  std::size_t wall_bytes() const { return (has_faces_ ? 4 : 3) * kNumberBytes; }
+
+  // At most kPerPage walls.
+  std::vector<mesh::WallArea> read_walls(std::uint64_t begin, std::uint64_t labels) const {
+    std::vector<std::byte> bytes(std::min<std::uint64_t>(kPerPage, count_ - begin) * wall_bytes());
+    read(*file_, begin * wall_bytes(), bytes);
+    std::vector<mesh::WallArea> walls;
+    for (std::size_t at = 0; at < bytes.size(); at += wall_bytes()) {
+      const auto number = [&](std::size_t n) {
+        return number_at(std::span(bytes).subspan(at + n * kNumberBytes, kNumberBytes));
+      };
+      const mesh::WallArea wall = {number(0), number(1), std::bit_cast<double>(number(2)),
+                                   has_faces_ ? number(3) : 0};
+      const bool is_possible = wall.a > 0 && std::max(wall.a, wall.b) <= labels &&
+                               wall.a != wall.b && std::isfinite(wall.area_mm2);
+      if (!is_possible) throw_damaged();
+      walls.push_back(wall);
+    }
+    return walls;
+  }
+
+  const bool has_faces_;
+  const std::uint64_t count_;
+  std::unique_ptr<store::BlobReader> file_;  // null if there are no walls
+};
 
 }  // namespace
 
@@ -182,46 +245,33 @@ void write_walls(std::span<const mesh::WallArea> walls, const codec::Sink& sink)
     append(wall.a, bytes);
     append(wall.b, bytes);
     append(std::bit_cast<std::uint64_t>(wall.area_mm2), bytes);
+    append(wall.faces, bytes);
   }
   sink(bytes);
 }
 
-std::vector<WallSummary> walls_of(const Job& job, std::uint64_t begin,
-                                  const store::BlobStore& blobs) {
+WallPage walls_of(const Job& job, std::uint64_t begin, bool edge_contacts,
+                  const store::BlobStore& blobs) {
   if (!job.parameters.labels) return {};
   if (!job.mesh->walls_count) {
     throw Error(ErrorCode::kNotFound,
                 "the job was made before walls were measured; submit it again to have them");
   }
-  const std::uint64_t count = *job.mesh->walls_count;
-  if (begin >= count) return {};
-  if (!job.mesh->wall_list) throw_damaged();
-  const auto file = blobs.open(job.mesh->wall_list->sha256);
-  if (file->size() / kWallBytes != count || file->size() % kWallBytes != 0) throw_damaged();
-  std::vector<std::byte> bytes(std::min<std::uint64_t>(kPerPage, count - begin) * kWallBytes);
-  read(*file, begin * kWallBytes, bytes);
-
+  const WallFile file(job, blobs);
   const JobLabels labels(job, blobs);
-  std::vector<mesh::WallArea> walls;
-  std::set<std::uint64_t> places;
-  for (std::size_t at = 0; at < bytes.size(); at += kWallBytes) {
-    const auto number = [&](std::size_t n) {
-      return number_at(std::span(bytes).subspan(at + n * kNumberBytes, kNumberBytes));
-    };
-    const mesh::WallArea wall = {number(0), number(1), std::bit_cast<double>(number(2))};
-    const bool is_possible = wall.a > 0 && std::max(wall.a, wall.b) <= labels.count() &&
-                             wall.a != wall.b && std::isfinite(wall.area_mm2);
-    if (!is_possible) throw_damaged();
-    walls.push_back(wall);
-    places.insert(wall.a);
-    if (wall.b != 0) places.insert(wall.b);
+  const auto places = file.page(begin, edge_contacts, labels.count());
+  std::set<std::uint64_t> named;
+  for (const mesh::WallArea& wall : places.walls) {
+    named.insert(wall.a);
+    if (wall.b != 0) named.insert(wall.b);
   }
-  const std::map<std::uint64_t, LabelSummary> found = labels.at(places);
-  std::vector<WallSummary> page;
-  for (const auto& [a, b, area] : walls) {
+  const std::map<std::uint64_t, LabelSummary> found = labels.at(named);
+  WallPage page = {.walls = {}, .next = places.next};
+  for (const auto& [a, b, area, faces] : places.walls) {
     const LabelSummary& label = found.at(a);
-    WallSummary& wall = page.emplace_back();
+    WallSummary& wall = page.walls.emplace_back();
     wall = {.a = label.label, .area_mm2 = area, .a_name = label.name};
+    if (file.has_faces()) wall.faces = faces;
     if (b == 0) continue;
     wall.b = found.at(b).label;
     wall.b_name = found.at(b).name;

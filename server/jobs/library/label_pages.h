@@ -4,8 +4,9 @@
 // entry per page: its first label and the offset of its first byte, each as a little-endian 64-bit
 // number.
 //
-// Its walls are in a file, too: for each one three such numbers, the places of its two labels among
-// the job's (from 1 on; 0 for the background) and the bits of its area.
+// Its walls are in a file, too: for each one four such numbers, the places of its two labels among
+// the job's (from 1 on; 0 for the background), the bits of its area and its number of faces. Files
+// of jobs without MeshSummary::edge_contacts_count lack the last.
 #pragma once
 
 #include <cstddef>
@@ -77,10 +78,16 @@ class JobLabels {
 // Writes the file of a job's walls.
 void write_walls(std::span<const mesh::WallArea> walls, const codec::Sink& sink);
 
-// The walls after the first `begin`, at most MeshSummary::kMostListedLabels. The job must have a
-// mesh. Throws Error kNotFound if it was made before walls were measured, and as JobLabels does.
-std::vector<WallSummary> walls_of(const Job& job, std::uint64_t begin,
-                                  const store::BlobStore& blobs);
+struct WallPage {
+  std::vector<WallSummary> walls;
+  std::optional<std::uint64_t> next;  // where the next page begins, if there is one
+};
+
+// The walls from place `begin` of the file on, at most MeshSummary::kMostListedLabels; those of
+// labels that share no face of a voxel only if `edge_contacts` is true. The job must have a mesh.
+// Throws Error kNotFound if it was made before walls were measured, and as JobLabels does.
+WallPage walls_of(const Job& job, std::uint64_t begin, bool edge_contacts,
+                  const store::BlobStore& blobs);
 
 // The materials of the job's OBJ, in the form of its file kMaterialsName; empty for a job at an
 // iso-value. Throws as JobLabels does.

@@ -118,6 +118,18 @@ void set_quality(const std::vector<mesh::LabelMeasure>& measures, MeshSummary& s
   conclude_quality(summary);
 }
 
+void measure_all_walls(const SampleArray& samples, const mesh::SeparateOptions& options,
+                       const Progress& progress, const mesh::SeparatingSurface& walls,
+                       MadeLabels& made) {
+  const mesh::VoxelFaces faces = with_label(samples.type, [&](auto sample) {
+    return count_faces(lattice_of<decltype(sample)>(samples), options, progress.quiet());
+  });
+  made.walls = measure_walls(walls, faces, progress.quiet());
+  const auto shared = std::ranges::count_if(made.walls, &mesh::WallArea::faces);
+  made.summary.walls_count = static_cast<std::uint64_t>(shared);
+  made.summary.edge_contacts_count = made.walls.size() - static_cast<std::uint64_t>(shared);
+}
+
 void encode_all(const codec::LabelledSurface& surface, const codec::Provenance& provenance,
                 std::span<const codec::Sink> sinks, const Progress& progress,
                 MeshSummary& summary) {
@@ -192,8 +204,7 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   const auto surfaces = label_surfaces(walls, progress.quiet());
   const auto measures = measure_labels(walls, surfaces, progress.quiet());
   set_quality(measures, summary);
-  made.walls = measure_walls(walls, progress.quiet());
-  summary.walls_count = made.walls.size();
+  measure_all_walls(samples, options, progress, walls, made);
   for (std::size_t n = 0; n < labels.size(); ++n) {
     summary.labels.push_back(summary_of(labels[n], measures[n], parameters));
   }

@@ -25,7 +25,7 @@ CountedSurface count_labels(const SampleArray& samples, const MeshParameters& pa
 
 struct MadeLabels {
   MeshSummary summary;
-  std::vector<mesh::WallArea> walls;  // as many as summary.walls_count
+  std::vector<mesh::WallArea> walls;  // summary.walls_count and edge_contacts_count together
 };
 
 // As make_mesh, for parameters with labels. `sinks` has one sink for each of files_of(parameters),

@@ -147,6 +147,25 @@ void take_surface(const SeparatingSurface& walls, std::size_t number, LabelSurfa
   mesh.layer_triangles = layers_of(label.triangles, from.layer_triangles);
 }
 
+// Calls visit(the numbers of two labels, the background last) for each pair of a label that is on
+// one side alone and one that is on the other side alone.
+template <class Visit>
+void visit_pairs(const LabelParts& parts, const WallSides& sides, Visit visit) {
+  std::array<std::vector<std::size_t>, 2> labels;
+  parts.visit_labels(sides.front, sides.back, [&](std::size_t label, bool is_front) {
+    labels[is_front ? 0 : 1].push_back(label);
+  });
+  for (auto& side : labels) {
+    if (side.empty()) side.push_back(0);
+  }
+  for (const std::size_t one : labels[0]) {
+    for (const std::size_t other : labels[1]) {
+      const auto [low, high] = std::minmax(one, other);
+      visit(low == 0 ? std::pair(high, low) : std::pair(low, high));
+    }
+  }
+}
+
 }  // namespace
 
 std::uint64_t LabelSurface::bytes(std::uint64_t vertices, std::uint64_t triangles) {
@@ -198,7 +217,8 @@ std::vector<LabelMeasure> measure_labels(const SeparatingSurface& walls,
   return measures;
 }
 
-std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Context& context) {
+std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const VoxelFaces& faces,
+                                    const Context& context) {
   const Mesh& mesh = surface.mesh;
   std::vector<std::map<WallSides, double>> layers(mesh.layers());
   parallel_for(context, layers.size(), [&](std::size_t layer) {
@@ -213,26 +233,19 @@ std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Cont
       *area += std::sqrt(dot(normal, normal)) / 2;
     }
   });
-  std::map<std::pair<std::size_t, std::size_t>, double> areas;
+  std::map<std::pair<std::size_t, std::size_t>, WallArea> found;
   for (const auto& layer : layers) {
     for (const auto& [sides, area] : layer) {
-      std::array<std::vector<std::size_t>, 2> labels;  // on one side alone
-      surface.parts.visit_labels(sides.front, sides.back, [&](std::size_t label, bool is_front) {
-        labels[is_front ? 0 : 1].push_back(label);
-      });
-      for (auto& side : labels) {
-        if (side.empty()) side.push_back(0);
-      }
-      for (const std::size_t one : labels[0]) {
-        for (const std::size_t other : labels[1]) {
-          const auto [low, high] = std::minmax(one, other);
-          areas[low == 0 ? std::pair(high, low) : std::pair(low, high)] += area;
-        }
-      }
+      visit_pairs(surface.parts, sides, [&](auto pair) { found[pair].area_mm2 += area; });
     }
   }
+  for (const auto& [sides, count] : faces) {
+    visit_pairs(surface.parts, sides, [&](auto pair) { found[pair].faces += count; });
+  }
   std::vector<WallArea> walls;
-  for (const auto& [pair, area] : areas) walls.push_back({pair.first, pair.second, area});
+  for (const auto& [pair, wall] : found) {
+    walls.push_back({pair.first, pair.second, wall.area_mm2, wall.faces});
+  }
   return walls;
 }
 

@@ -8,6 +8,7 @@
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
 #include "server/mesh/labels/separate.h"
+#include "server/mesh/labels/voxel_faces.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/topology/topology.h"
 
@@ -59,13 +60,17 @@ struct WallArea {
   std::size_t a = 0;  // the numbers of the labels, from 1 on; the smaller first
   std::size_t b = 0;  // 0: the background, and what lies beyond caps
   double area_mm2 = 0;
+  std::uint64_t faces = 0;  // that voxels of the two share; none of those that meet at edges only
 };
 
-// The areas of all walls, ascending by `a`, then by `b`. A triangle belongs to each pair of a label
-// that is only on one side of it and a label that is only on the other side; where the other side
-// has no such label, to the background. If no labels overlap, that is one pair, and the areas add
-// up to the surface's. The same for any number of threads. Throws Error kCancelled.
-std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Context& context);
+// The areas of all walls, and of pairs that share faces of voxels but have no triangle between them
+// (any more), ascending by `a`, then by `b`. `faces`: those of the samples that the surface was
+// made of. A triangle, or a face, belongs to each pair of a label that is only on one side of it
+// and a label that is only on the other side; where the other side has no such label, to the
+// background. If no labels overlap, that is one pair, and the areas add up to the surface's. The
+// same for any number of threads. Throws Error kCancelled.
+std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const VoxelFaces& faces,
+                                    const Context& context);
 
 // The volume that all labels enclose together, in cubic millimetres. For an open surface it is
 // defined as Extent::volume_mm3 is. The same for any number of threads. Throws Error kCancelled.

@@ -215,12 +215,14 @@ TEST(LabelList, IsATable) {
 }
 
 TEST(WallList, IsATable) {
-  EXPECT_EQ(wall_list({{.a = 3, .area_mm2 = 1234.56, .a_name = "liver"},
-                       {.a = 3, .b = 12, .area_mm2 = 7, .a_name = "liver", .b_name = "gut"}},
-                      {"mm", "millimetres", 1e-3}),
-            "  label  name   label  name            mm²\n"
-            "      3  liver         background  1,234.6\n"
-            "      3  liver     12  gut             7.0\n");
+  EXPECT_EQ(
+      wall_list(
+          {{.a = 3, .area_mm2 = 1234.56, .a_name = "liver"},
+           {.a = 3, .b = 12, .area_mm2 = 7, .faces = 1234, .a_name = "liver", .b_name = "gut"}},
+          {"mm", "millimetres", 1e-3}),
+      "  label  name   label  name            mm²  faces\n"
+      "      3  liver         background  1,234.6       \n"
+      "      3  liver     12  gut             7.0  1,234\n");
 }
 
 TEST(JobReport, TellsAJobThatRunsFromOneThatFailed) {

@@ -385,7 +385,7 @@ Job labelled_job(const std::string& obj) {
 
 // The name of the materials is replaced in these bytes, which wait until they are complete.
 TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
-  const std::string line = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
+  const std::string line = "# isomesh, millimetres, SPACE=LPS\nmtllib mesh.mtl\n";
   for (const std::size_t size : {60U, 100U, 101U, 5000U}) {
     const std::string mesh = line + std::string(size - line.size(), '#');
     for (const bool knows_ranges : {true, false}) {
@@ -411,7 +411,7 @@ TEST_F(Fetch, NamesTheMaterialsWhereTheConnectionBreaksInTheHeadOfAnObj) {
 }
 
 TEST_F(Fetch, PutsTheMaterialsBesideTheFileBehindALink) {
-  const std::string mesh = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
+  const std::string mesh = "# isomesh, millimetres, SPACE=LPS\nmtllib mesh.mtl\n";
   server_.http.Get("/v1/jobs/7", test::answering(to_json(labelled_job(mesh))));
   server_.http.Get("/v1/jobs/7/mesh.obj", test::answering(mesh, "model/obj"));
   server_.http.Get("/v1/jobs/7/mesh.mtl", test::answering("newmtl a\n", "model/mtl"));
@@ -440,7 +440,7 @@ TEST_F(Fetch, NamesEveryFileThatItWrites) {
 }
 
 TEST_F(Fetch, ReplacesNoFileIfItShallNot) {
-  const std::string mesh = "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n";
+  const std::string mesh = "# isomesh, millimetres, SPACE=LPS\nmtllib mesh.mtl\n";
   server_.http.Get("/v1/jobs/7", test::answering(to_json(labelled_job(mesh))));
   // Another program is quicker.
   std::string quicker;

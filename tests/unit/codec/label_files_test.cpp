@@ -250,7 +250,7 @@ TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
   EXPECT_NE(glb.find("label 3"), std::string::npos);
   EXPECT_EQ(unzipped(zipped({MeshFormat::kStl}).bytes).at("label 3.stl").size(), 84U);
   EXPECT_NE(encoded(MeshFormat::kPly).find("element face 0"), std::string::npos);
-  EXPECT_EQ(encoded(MeshFormat::kObj), "# isomesh, millimetres, LPS\nmtllib mesh.mtl\n");
+  EXPECT_EQ(encoded(MeshFormat::kObj), "# isomesh, millimetres, SPACE=LPS\nmtllib mesh.mtl\n");
   const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
   EXPECT_TRUE(model.objects.empty());
   EXPECT_EQ(model.metadata.at("Title"), "no label");
@@ -319,7 +319,7 @@ TEST_F(LabelFilesTest, LabelsMayHave64Bits) {
 // Blender makes an object of each `o`, and drops a face whose vertices another face has, too.
 TEST_F(LabelFilesTest, ObjHasAnObjectWithVerticesOfItsOwnForEachLabel) {
   const std::string obj = encoded(MeshFormat::kObj);
-  EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, LPS\nmtllib mesh.mtl\no label_1\nv "));
+  EXPECT_TRUE(obj.starts_with("# isomesh, millimetres, SPACE=LPS\nmtllib mesh.mtl\no label_1\nv "));
   std::istringstream lines(obj);
   std::size_t objects = 0;
   std::uint64_t first = 1;

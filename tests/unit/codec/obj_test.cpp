@@ -17,9 +17,9 @@ using test::encoded;
 TEST(Obj, IsAVertexOrAFaceALine) {
   const mesh::Mesh mesh =
       test::mesh_of({{0, 0.5F, -1}, {1e6F, 0, 0}, {0, 1.25F, 0}}, {{0, 2, 1}, {2, 0, 1}});
-  EXPECT_EQ(
-      encoded(mesh, MeshFormat::kObj),
-      "# isomesh, millimetres, LPS\nv 0 0.5 -1\nv 1000000 0 0\nv 0 1.25 0\nf 1 3 2\nf 3 1 2\n");
+  EXPECT_EQ(encoded(mesh, MeshFormat::kObj),
+            "# isomesh, millimetres, SPACE=LPS\nv 0 0.5 -1\nv 1000000 0 0\nv 0 1.25 0\nf 1 3 2\nf "
+            "3 1 2\n");
 }
 
 TEST(Obj, CoordinatesReadAsTheSameFloatsAndHaveNoExponent) {

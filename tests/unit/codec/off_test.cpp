@@ -16,8 +16,9 @@ TEST(Off, TellsUnitAndSpaceAtItsEnd) {
       test::mesh_of({{0, 0.5F, -1}, {1e6F, 0, 0}, {0, 1.25F, 0}}, {{0, 2, 1}, {2, 0, 1}});
   EXPECT_EQ(encoded(mesh, MeshFormat::kOff),
             "OFF\n3 2 0\n0 0.5 -1\n1000000 0 0\n0 1.25 0\n3 0 2 1\n3 2 0 1\n"
-            "# isomesh, millimetres, LPS\n");
-  EXPECT_EQ(encoded(mesh::Mesh{}, MeshFormat::kOff), "OFF\n0 0 0\n# isomesh, millimetres, LPS\n");
+            "# isomesh, millimetres, SPACE=LPS\n");
+  EXPECT_EQ(encoded(mesh::Mesh{}, MeshFormat::kOff),
+            "OFF\n0 0 0\n# isomesh, millimetres, SPACE=LPS\n");
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ TEST(Ply, SaysHowManyVerticesAndFacesFollowAndInWhatUnit) {
       test::mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}});
   const std::string ply = encoded(mesh, MeshFormat::kPly);
   const std::string header =
-      "ply\nformat binary_little_endian 1.0\ncomment isomesh, millimetres, LPS\n"
+      "ply\nformat binary_little_endian 1.0\ncomment isomesh, millimetres, SPACE=LPS\n"
       "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
       "element face 2\nproperty list uchar uint vertex_indices\nend_header\n";
   ASSERT_TRUE(ply.starts_with(header)) << ply.substr(0, header.size());

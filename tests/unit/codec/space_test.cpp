@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/codec/decode/decode.h"
@@ -18,6 +19,8 @@ namespace {
 using mesh::Vec3;
 using test::encoded;
 using test::provenance_in;
+using testing::HasSubstr;
+using testing::Not;
 
 mesh::Mesh oblique() { return std::move(test::meshes_to_encode().at(3).mesh); }
 
@@ -61,12 +64,30 @@ TEST(SpaceOf, IsThatOfTheParameterUnlessTheFormatHasItsOwn) {
   }
 }
 
-TEST(SpaceOfStl, IsToldInTheHeader) {
-  EXPECT_NE(encoded(oblique(), MeshFormat::kStl, provenance_in(Space::kRas)).find("SPACE=RAS"),
-            std::string::npos);
+// 3D Slicer takes a file that says neither for LPS, and so turns one in RAS by 180 degrees.
+TEST(SpaceOf, IsInTheHeaderInTheWordsThat3dSlicerLooksFor) {
+  for (const MeshFormat format :
+       {MeshFormat::kStl, MeshFormat::kVtk, MeshFormat::kPly, MeshFormat::kObj, MeshFormat::kOff}) {
+    SCOPED_TRACE(to_string(format));
+    const std::string lps = encoded(oblique(), format, provenance_in(Space::kLps));
+    EXPECT_THAT(lps, HasSubstr("SPACE=LPS"));
+    EXPECT_THAT(lps, Not(HasSubstr("SPACE=RAS")));
+    const std::string ras = encoded(oblique(), format, provenance_in(Space::kRas));
+    EXPECT_THAT(ras, HasSubstr("SPACE=RAS"));
+    EXPECT_THAT(ras, Not(HasSubstr("SPACE=LPS")));
+  }
 }
 
 class SpaceOfLabels : public test::LabelFilesTest {};
+
+TEST_F(SpaceOfLabels, IsInTheHeaderThereToo) {
+  for (const MeshFormat format : {MeshFormat::kVtk, MeshFormat::kPly, MeshFormat::kObj}) {
+    provenance_.parameters.space = Space::kRas;
+    EXPECT_THAT(encoded(format), HasSubstr("SPACE=RAS")) << to_string(format);
+    provenance_.parameters.space = Space::kLps;
+    EXPECT_THAT(encoded(format), HasSubstr("SPACE=LPS")) << to_string(format);
+  }
+}
 
 TEST_F(SpaceOfLabels, LabelsInAZipShareOneGridThereToo) {
   provenance_.parameters.space = Space::kRas;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -191,6 +192,41 @@ std::map<std::int64_t, std::uint64_t> voxels_of(const MeshSummary& mesh) {
   std::map<std::int64_t, std::uint64_t> voxels;
   for (const LabelSummary& label : mesh.labels) voxels[label.label] = label.voxels;
   return voxels;
+}
+
+// Of a cube of two halves. Its mesh may be simplified.
+TEST_F(LabelJobsTest, CountTheFacesThatTheirSamplesShare) {
+  auto samples = test::constant<std::uint8_t>(0, {8, 8, 8});
+  for (std::uint32_t k = 1; k < 7; ++k) {
+    for (std::uint32_t j = 1; j < 7; ++j) {
+      for (std::uint32_t i = 1; i < 7; ++i) samples.at(i, j, k) = i < 4 ? 1 : 2;
+    }
+  }
+  const Volume volume = add(samples, SampleType::kUint8);
+  const auto faces = [&](const JobParameters& parameters) {
+    Job job;
+    job.parameters = parameters;
+    job.mesh = run(volume, parameters).mesh;
+    std::map<std::pair<std::int64_t, std::int64_t>, std::uint64_t> found;
+    for (const WallSummary& wall : walls_of(job, 0, true, blobs_).walls) {
+      found[{wall.a, wall.b.value_or(0)}] = wall.faces.value_or(0);
+    }
+    EXPECT_EQ(job.mesh->walls_count, found.size());
+    EXPECT_EQ(job.mesh->edge_contacts_count, 0U);
+    return found;
+  };
+  using Faces = std::map<std::pair<std::int64_t, std::int64_t>, std::uint64_t>;
+  JobParameters parameters = label_parameters({});
+  EXPECT_EQ(faces(parameters), (Faces{{{1, 0}, 108}, {{1, 2}, 36}, {{2, 0}, 108}}));
+  parameters.triangles = 60;
+  EXPECT_EQ(faces(parameters), (Faces{{{1, 0}, 108}, {{1, 2}, 36}, {{2, 0}, 108}}));
+  parameters.crop = Box{{{0, 0, 0}, {7, 3, 7}}};
+  EXPECT_EQ(faces(parameters), (Faces{{{1, 0}, 54}, {{1, 2}, 18}, {{2, 0}, 54}}));
+  parameters.close = true;
+  EXPECT_EQ(faces(parameters), (Faces{{{1, 0}, 72}, {{1, 2}, 18}, {{2, 0}, 72}}));
+  JobParameters joined = label_parameters({{50}});
+  joined.label_values = {{50, {1, 2}}};
+  EXPECT_EQ(faces(joined), (Faces{{{50, 0}, 216}}));
 }
 
 // Labels of 64 bits were numbered from 1, but requests do not know that.

@@ -1,6 +1,8 @@
 // Labels of a job in pages: from its record, and from a file that may be damaged.
 #include "server/jobs/library/label_pages.h"
 
+#include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -145,13 +147,30 @@ TEST_F(LabelPagesTest, OfADamagedFileAreRejected) {
   EXPECT_EQ(code_thrown_by([&] { all_of(missing); }), ErrorCode::kNotFound);
 }
 
+// Jobs of older servers have walls without faces, and list all of them.
+TEST_F(LabelPagesTest, WallsWithoutFacesAreReadToo) {
+  Job job = job_with(file_of(some_labels(600)), 600);
+  job.parameters.labels.emplace();
+  job.mesh->walls_count = 1;
+  std::string file(24, '\0');
+  file[0] = 2;
+  file[22] = '\xf0';  // 1.0
+  file[23] = '\x3f';
+  const store::Blob blob = test::put(blobs_, file);
+  job.mesh->wall_list = {blob.bytes, blob.key};
+  const WallSummary wall = {.a = -297, .area_mm2 = 1, .a_name = "label 1"};
+  EXPECT_EQ(walls_of(job, 0, false, blobs_).walls, std::vector{wall});
+}
+
 TEST_F(LabelPagesTest, WallsTellTheirLabels) {
   Job job = job_with(file_of(some_labels(600)), 600);
   job.parameters.labels.emplace();
+  // Every third is between labels that share no face.
   job.mesh->walls_count = 300;
-  std::vector<mesh::WallArea> walls(300);
+  job.mesh->edge_contacts_count = 150;
+  std::vector<mesh::WallArea> walls(450);
   for (std::size_t n = 0; n < walls.size(); ++n) {
-    walls[n] = {n + 1, n % 2 == 0 ? 0U : 600U, static_cast<double>(n) / 4};
+    walls[n] = {n + 1, n % 2 == 0 ? 0U : 600U, static_cast<double>(n) / 4, n % 3};
   }
   const auto keep = [&](std::string file) {
     const store::Blob blob = test::put(blobs_, file);
@@ -162,18 +181,29 @@ TEST_F(LabelPagesTest, WallsTellTheirLabels) {
     file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   });
   keep(file);
-  EXPECT_EQ(walls_of(job, 0, blobs_).size(), 256U);
-  EXPECT_EQ(walls_of(job, 256, blobs_).size(), 44U);
-  EXPECT_TRUE(walls_of(job, 300, blobs_).empty());
-  const auto both = walls_of(job, 298, blobs_);
-  const WallSummary alone = {-300 + 3 * 298, std::nullopt, 74.5, "label 298", std::nullopt};
-  const WallSummary last = {-300 + 3 * 299, -300 + 3 * 599, 74.75, "label 299", "label 599"};
+  const auto expect_page = [&](std::uint64_t begin, bool edge_contacts, std::size_t count,
+                               std::optional<std::uint64_t> next) {
+    const WallPage page = walls_of(job, begin, edge_contacts, blobs_);
+    EXPECT_EQ(page.walls.size(), count);
+    EXPECT_EQ(page.next, next);
+    const bool has_any = std::ranges::count(page.walls, 0U, &WallSummary::faces) > 0;
+    EXPECT_EQ(has_any, edge_contacts && count > 0);
+  };
+  expect_page(0, false, 256, 385);
+  expect_page(385, false, 44, std::nullopt);
+  expect_page(450, false, 0, std::nullopt);
+  expect_page(0, true, 256, 256);
+  expect_page(256, true, 194, std::nullopt);
+  expect_page(450, true, 0, std::nullopt);
+  const auto both = walls_of(job, 448, false, blobs_).walls;
+  const WallSummary alone = {-300 + 3 * 448, std::nullopt, 112, 1, "label 448", std::nullopt};
+  const WallSummary last = {-300 + 3 * 449, -300 + 3 * 599, 112.25, 2, "label 449", "label 599"};
   EXPECT_EQ(both, (std::vector{alone, last}));
 
-  const auto code = [&] { return code_thrown_by([&] { walls_of(job, 0, blobs_); }); };
+  const auto code = [&] { return code_thrown_by([&] { walls_of(job, 0, true, blobs_); }); };
   keep(file.substr(1));
   EXPECT_EQ(code(), ErrorCode::kInternal);
-  for (const auto& [at, byte] : {std::pair(0, 0), {1, 0x7f}, {33, 0x7f}, {22, 0xff}}) {
+  for (const auto& [at, byte] : {std::pair(0, 0), {1, 0x7f}, {9, 0x7f}, {22, 0xff}}) {
     std::string damaged = file;  // no label, labels that there are not, an area that is none
     damaged[static_cast<std::size_t>(at)] = static_cast<char>(byte);
     if (at == 22) damaged[23] = '\x7f';

@@ -50,7 +50,8 @@ using WallAreas = std::map<std::pair<std::size_t, std::size_t>, double>;
 
 WallAreas walls_between(const SeparatingSurface& surface) {
   WallAreas areas;
-  for (const WallArea& wall : measure_walls(surface, {})) areas[{wall.a, wall.b}] = wall.area_mm2;
+  for (const WallArea& wall : measure_walls(surface, {}, {}))
+    areas[{wall.a, wall.b}] = wall.area_mm2;
   return areas;
 }
 

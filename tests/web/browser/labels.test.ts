@@ -379,13 +379,15 @@ describe('the surfaces of labels', () => {
   });
 
   it('are listed with those that they touch, by the areas of their walls', async ({ page, daemon }) => {
-    const { walls } = await daemon.json<{ walls: { a: number; b: number | null; area_mm2: number }[] }>(`/v1/jobs/${made.id}/walls`);
+    const { walls } = await daemon.json<{ walls: { a: number; b: number | null; area_mm2: number; faces: number }[] }>(`/v1/jobs/${made.id}/walls`);
     await open();
     await page.getByText('Who touches whom').click();
     const rows = page.locator('.walls tbody tr');
     await expect.poll(() => rows.count()).toBe(walls.length);
-    const areas = (await rows.locator('td.number').allInnerTexts()).map((text) => Number(text.replace(/[^\d.]|mm.*/g, '')));
+    const columns = [3, 4].map((column) => rows.locator(`td:nth-child(${column})`).allInnerTexts());
+    const [areas = [], faces = []] = (await Promise.all(columns)).map((texts) => texts.map((text) => Number(text.replace(/[^\d.]|mm.*/g, ''))));
     expect(areas).toEqual([...areas].sort((a, b) => b - a));
+    expect(new Set(faces)).toEqual(new Set(walls.map((wall) => wall.faces)));
     await page.getByLabel('Search the labels').fill('left');
     await expect.poll(() => rows.count()).toBe(walls.filter(({ a, b }) => a === 2 || b === 2).length);
     await expect.poll(() => rows.filter({ hasText: 'Right half' }).innerText()).toMatch(/^Right half\s+Left half\s+\d+/);

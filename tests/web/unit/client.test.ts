@@ -107,6 +107,7 @@ describe('the labels of a job', () => {
 
   it('have walls, which come from all pages', async () => {
     expect((await client.wallsOfJob(id)).map(({ b }) => b)).toEqual([null, 4]);
+    expect((await client.wallsOfJob(id, undefined, true)).map(({ b }) => b)).toEqual([null, 4, 5]);
   });
 });
 

@@ -73,7 +73,8 @@ export class Daemon {
     } else if (path === `/v1/jobs/${id}/labels`) {
       response.end(JSON.stringify(isLast ? { labels: [{ label: 3 }], next: null } : { labels: [{ label: 1 }, { label: 2 }], next: 'the rest' }));
     } else if (path === `/v1/jobs/${id}/walls`) {
-      const walls = isLast ? [{ a: 3, b: 4, area_mm2: 1 }] : [{ a: 3, b: null, area_mm2: 2 }];
+      const atEdges = this.query.get('edge_contacts') === 'true' ? [{ a: 3, b: 5, area_mm2: 0.1, faces: 0 }] : [];
+      const walls = isLast ? [{ a: 3, b: 4, area_mm2: 1, faces: 5 }, ...atEdges] : [{ a: 3, b: null, area_mm2: 2, faces: 6 }];
       response.end(JSON.stringify({ walls, next: isLast ? null : 'the rest' }));
     } else if (path === `/v1/volumes/${id}/labels`) {
       const labels = isLast ? [{ label: 3 }] : [{ label: 1 }, { label: 2 }];

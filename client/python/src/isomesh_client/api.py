@@ -746,6 +746,9 @@ class MeshSummary(TypedDict):
     #: For a job by labels: how many pairs of labels touch, or of a label and the background.
     #: /v1/jobs/{id}/walls lists them. A job of an older server does not have it.
     walls_count: NotRequired[int]
+    #: For a job by labels: how many pairs the same list has besides with edge_contacts=true. A job
+    #: of an older server does not have it, and its walls_count includes them.
+    edge_contacts_count: NotRequired[int]
     certificate: NotRequired[MeshCertificate]
     thickness: NotRequired[Thickness]
 
@@ -824,14 +827,18 @@ class WallSummary(TypedDict):
     """The area where two labels touch, or where a label is next to the background, after
     smoothing. What closes a label at the volume's border with close is next to the background,
     too. The areas of a label's walls add up to the area of its surface, and those of all walls
-    to the area of the mesh. Only where labels overlap they may be more: a triangle counts for
-    each pair of a label that ends there on one side and a label that ends there on the other
-    side."""
+    to the area of the mesh, if edge_contacts are among them. Only where labels overlap they may
+    be more: a triangle counts for each pair of a label that ends there on one side and a label
+    that ends there on the other side."""
 
     a: int
     #: The other label, the greater number. Null for the background.
     b: Optional[int]
     area_mm2: float
+    #: How many faces the voxels of the two share, in the samples of the job: what smoothing and
+    #: simplification do does not change it. 0 if they meet at edges and corners only. A job of an
+    #: older server does not have it.
+    faces: NotRequired[int]
     a_name: Optional[str]
     #: Null also for the background.
     b_name: Optional[str]

@@ -302,14 +302,14 @@ class Client(Batches):
             self._exchange.pause(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
 
     def job_labels(self, job: Union[str, AnyJob]) -> List[api.LabelSummary]:
-        """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
-        number, `job["mesh"]["labels_count"]`."""
+        """The labels of a succeeded job, in ascending order. With more than 256, `job["mesh"]` has only their number."""
         return cast("List[api.LabelSummary]", list(self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})))
 
-    def job_walls(self, job: Union[str, AnyJob]) -> List[api.WallSummary]:
-        """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None.
-        In ascending order of labels."""
-        return cast("List[api.WallSummary]", list(self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, {})))
+    def job_walls(self, job: Union[str, AnyJob], *, edge_contacts: bool = False) -> List[api.WallSummary]:
+        """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None. In
+        ascending order of labels. With `edge_contacts` also those of pairs that share no face of a voxel."""
+        query = {"edge_contacts": "true"} if edge_contacts else {}
+        return cast("List[api.WallSummary]", list(self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, query)))
 
     def report(self, job: Union[str, AnyJob]) -> api.JobReport:
         """What a succeeded job made, of what and how: to keep beside its mesh."""

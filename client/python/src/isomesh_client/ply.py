@@ -14,7 +14,8 @@ from .errors import WrongAnswer
 
 _HEADER_END = b"end_header\n"
 _LONGEST_HEADER = 1 << 22  # with a comment for each of 65535 labels
-_COMMENT = "comment isomesh, millimetres, "
+_COMMENT = "comment isomesh, millimetres, SPACE="
+_SAYS_RAS = re.compile("comment isomesh, [a-z]+, (SPACE=)?RAS")  # older servers wrote the letters alone
 _POSITION = "".join(f"property float {axis}\n" for axis in "xyz")
 _COLOR = "".join(f"property uint8 {channel}\n" for channel in ("red", "green", "blue"))
 _CORNERS = "property list uchar uint vertex_indices\n"
@@ -205,7 +206,7 @@ def _header_of(text: bytes) -> _Header:
         vertices=int(counts["vertex"]),
         faces=int(counts["face"]),
         begin=end + len(_HEADER_END),
-        space="ras" if f"{_COMMENT}RAS" in lines else "lps",
+        space="ras" if any(map(_SAYS_RAS.fullmatch, lines)) else "lps",
         has_colors=has_colors,
         label_of=labels[0][0] if labels else "",
         label_kind=labels[0][1] if labels else "",

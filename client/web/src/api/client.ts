@@ -215,9 +215,10 @@ export class Client {
     return this.connection.json(`${jobPath(id)}/report`, { signal });
   }
 
-  /** Lists the areas where two labels of a finished job touch, or one is next to the background, whose `b` is null. */
-  wallsOfJob(id: string, signal?: GlobalAbortSignal): Promise<WallSummary[]> {
-    return allPages((cursor) => this.connection.json<WallList>(`${jobPath(id)}/walls${queryOf({ cursor })}`, { signal }), ({ walls }) => walls);
+  /** Lists the areas where two labels of a finished job touch, or one is next to the background, whose `b` is null. With `edgeContacts` also those of pairs that share no face of a voxel. */
+  wallsOfJob(id: string, signal?: GlobalAbortSignal, edgeContacts = false): Promise<WallSummary[]> {
+    const query = { edge_contacts: edgeContacts ? 'true' : undefined };
+    return allPages((cursor) => this.connection.json<WallList>(`${jobPath(id)}/walls${queryOf({ cursor, ...query })}`, { signal }), ({ walls }) => walls);
   }
 
   /** Erases a job that has ended, and its files. */

@@ -104,21 +104,29 @@ void Painter::find_rectangle(const ContourGrid& grid) {
     for (const auto& contour : plane.contours) {
       for (const PlanePoint& point : contour) {
         for (std::size_t axis = 0; axis < 2; ++axis) {
-          low[axis] = std::min(low[axis], std::floor(point[axis]));
-          high[axis] = std::max(high[axis], std::ceil(point[axis]));
+          low[axis] = std::min(low[axis], point[axis]);
+          high[axis] = std::max(high[axis], point[axis]);
         }
       }
     }
   }
   const auto size = [&](std::size_t axis, std::uint32_t& first) -> std::uint32_t {
-    const double begin = std::max(low[axis], 0.0);
-    const double end = std::min(high[axis] + 1, static_cast<double>(grid.dims[axis]));
+    const auto samples = static_cast<double>(grid.dims[axis]);
+    // A sample on a contour belongs to the side of the higher ones (raster.h).
+    if (low[axis] <= -1 || high[axis] > samples) is_cut_ = true;
+    const double begin = std::max(std::floor(low[axis]), 0.0);
+    const double end = std::min(std::ceil(high[axis]) + 1, samples);
     if (!(begin < end)) return 0;
     first = static_cast<std::uint32_t>(begin);
     return static_cast<std::uint32_t>(end) - first;
   };
   width_ = size(0, left_);
   height_ = size(1, top_);
+  if (planes_.empty()) return;
+  // As slice() finds them, of the two slices next to the grid.
+  const double half = usual_ / 2;
+  if (planes_.front().place + 1 <= half + kPlaceTolerance) is_cut_ = true;
+  if (grid.dims[2] - planes_.back().place < half - kPlaceTolerance) is_cut_ = true;
 }
 
 bool Painter::is_shifted() const {

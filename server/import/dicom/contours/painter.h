@@ -45,6 +45,8 @@ class Painter {
   // True if both ends lie on slices, of which only the first is drawn: then the structure is half a
   // slice nearer to the first slice.
   bool is_shifted() const;
+  // True if the grid ends before the structure does, so that samples of it are missing.
+  bool is_cut() const { return is_cut_; }
   // True if no contour lies within the grid.
   bool is_outside() const { return planes_.empty() || width_ == 0 || height_ == 0; }
 
@@ -71,6 +73,7 @@ class Painter {
   std::uint32_t top_ = 0;
   std::uint32_t width_ = 0;
   std::uint32_t height_ = 0;
+  bool is_cut_ = false;
   std::array<std::optional<Distances>, 2> cached_;  // of planes with even and odd indices
   std::size_t tilted_ = 0;
   std::size_t interpolated_ = 0;

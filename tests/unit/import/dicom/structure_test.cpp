@@ -1,4 +1,5 @@
 // RT structure sets: contours drawn on the grid of their images, or on one of their own.
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -16,6 +17,7 @@ using namespace dicom;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 // Twenty by sixteen samples of 1 mm in eight slices 2 mm apart, from (0, 0, 0).
 const DicomSeries kImages = {.columns = 20,
@@ -271,6 +273,82 @@ TEST(DicomStructures, TellWhatIsNotDrawn) {
               AllOf(HasSubstr("3 contours not closed"), HasSubstr("1 contour not parallel"),
                     HasSubstr("1 structure without closed"), HasSubstr("1 structure with no")));
   EXPECT_EQ(outcome.volume.labels.size(), 1);
+}
+
+// A box in the slices of kImages, or beyond them.
+std::vector<TestContour> boxes(double left, double top, double right, double bottom,
+                               const std::vector<double>& heights) {
+  std::vector<TestContour> contours;
+  for (const double z : heights) contours.push_back({box(left, top, right, bottom, z)});
+  return contours;
+}
+
+std::uint64_t voxels_of(const Outcome& outcome, char label) {
+  return static_cast<std::uint64_t>(std::ranges::count(outcome.sample_bytes(), label));
+}
+
+const std::vector<double> kHeights = {4, 6, 8};
+
+TEST(DicomStructures, TellThatTheGridCutsThem) {
+  struct Case {
+    std::vector<TestContour> contours;
+    std::uint64_t there;  // samples on the grid
+    std::uint64_t whole;  // all samples of 1 x 1 x 2 mm
+  };
+  const std::vector<Case> cut = {
+      {boxes(15.5, 4.5, 24.5, 8.5, kHeights), 4 * 4 * 3, 9 * 4 * 3},
+      {boxes(-3.5, 4.5, 2.5, 8.5, kHeights), 3 * 4 * 3, 6 * 4 * 3},
+      {boxes(4.5, 12.5, 8.5, 19.5, kHeights), 4 * 3 * 3, 4 * 7 * 3},
+      {boxes(4.5, -1.5, 8.5, 2.5, kHeights), 4 * 3 * 3, 4 * 4 * 3},
+      {boxes(4.5, 4.5, 8.5, 8.5, {-4, -2, 0, 2}), 4 * 4 * 2, 4 * 4 * 4},
+      {boxes(4.5, 4.5, 8.5, 8.5, {12, 14, 16}), 4 * 4 * 2, 4 * 4 * 3},
+  };
+  for (const auto& [contours, there, whole] : cut) {
+    SCOPED_TRACE(testing::PrintToString(contours.front().points));
+    const std::vector<TestStructure> set = {
+        {.number = 3, .name = "inside", .contours = boxes(4.5, 9.5, 8.5, 11.5, kHeights)},
+        {.number = 7, .name = "cut", .contours = contours}};
+    const Outcome outcome = imported(draw(set));
+    EXPECT_EQ(voxels_of(outcome, 7), there);
+    EXPECT_THAT(
+        note_detail(outcome, NoteCode::kContoursSkipped),
+        AllOf(HasSubstr("1 structure where the grid ends before the contours do (label 7)"),
+              HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,2, to draw"), Not(HasSubstr("cut"))));
+    // The remedy has all of it.
+    const Outcome all = imported(draw_alone(structure_set(set), {1, 1, 2}));
+    EXPECT_EQ(voxels_of(all, 7), whole);
+    EXPECT_EQ(note_detail(all, NoteCode::kContoursSkipped), "");
+  }
+}
+
+TEST(DicomStructures, TellNothingOfACutThatLeavesNoSampleOut) {
+  // Up to less than a sample beyond the outermost ones, and to the first and the last slice.
+  const Outcome outcome = imported(draw(
+      {{.number = 1, .contours = boxes(-0.9, -0.5, 19.5, 15.9, {0, 2, 4, 6, 8, 10, 12, 14})}}));
+  EXPECT_EQ(note_detail(outcome, NoteCode::kContoursSkipped), "");
+  EXPECT_EQ(voxels_of(outcome, 1), 20U * 16 * 8);
+}
+
+TEST(DicomStructures, BeyondTheGridOrOnOtherPlanesAreOfferedAGridOfTheirOwn) {
+  const std::vector<TestStructure> beyond = {{.contours = boxes(195.5, 4.5, 199.5, 8.5, kHeights)}};
+  EXPECT_THAT(draw(beyond).error,
+              AllOf(HasSubstr("No contour"), HasSubstr("of its images"),
+                    HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,2, to draw")));
+  EXPECT_EQ(voxels_of(imported(draw_alone(structure_set(beyond), {1, 1, 2})), 1), 4U * 4 * 3);
+  // Sagittal planes, 1.5 mm apart.
+  std::vector<TestContour> sagittal;
+  for (const double x : {4.0, 5.5, 7.0}) {
+    sagittal.push_back({{{x, 2.5, 2}, {x, 8.5, 2}, {x, 8.5, 10}, {x, 2.5, 10}}});
+  }
+  const std::vector<TestStructure> tilted = {{.contours = sagittal}};
+  EXPECT_THAT(draw(tilted).error, HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,1.5, to draw"));
+  EXPECT_EQ(voxels_of(imported(draw_alone(structure_set(tilted), {1, 1, 1.5})), 1), 6U * 8 * 3);
+  // Between all samples of the grid that was asked for.
+  const Points triangle = {{4.2, 4.4, 2}, {4.3, 4.2, 2}, {4.4, 4.4, 2}};
+  const std::vector<TestStructure> small = {{.contours = {{triangle}}}};
+  EXPECT_THAT(draw_alone(structure_set(small), {1, 1, 2}).error,
+              AllOf(HasSubstr("No contour"), HasSubstr("A smaller spacing=X,Y,Z"),
+                    Not(HasSubstr("images"))));
 }
 
 DicomObject with_data(const std::string& data) {
