@@ -329,6 +329,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   if (is_told(self, self.thickness.has_value())) {
     field("thickness", self.thickness);
   }
+  if (is_told(self, !self.notes.empty())) {
+    field("notes", self.notes);
+  }
 }
 
 void visit(Is<FieldError> auto& self, auto&& field) {

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/notes.h"
+
 namespace isomesh {
 
 // kUsda: USD's text. kUsdz: that in a package. kVtk: VTK's legacy file. kVtp: VTK's XML file. kGii:
@@ -329,6 +331,7 @@ struct MeshSummary {
   std::optional<LabelListFile> wall_list = {};
   std::optional<MeshCertificate> certificate = {};
   std::optional<Thickness> thickness = {};  // if requested
+  std::vector<Note> notes = {};             // on the mesh alone, not on its volume
 
   bool operator==(const MeshSummary&) const = default;
 };

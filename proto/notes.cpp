@@ -165,6 +165,14 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning = "Somebody flipped or turned the volume, because its file places it wrongly. The "
                 "detail says how. Positions differ from those in the file.",
      .is_in_mesh = true},
+    {.code = NoteCode::kThinWalls,
+     .name = "thin-walls",
+     .meaning =
+         "Only of a mesh. A cavity of at least 8 voxels is closed by the faces of voxels, but open "
+         "in the surface: its wall is thinner than the longest edges of the lattice. The detail "
+         "names another `scheme`, if one closes more of the cavities. Jobs by labels, jobs with "
+         "`fill_cavities` or `components`, and those on masks look for such cavities.",
+     .is_of_mesh = true},
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Notes on how a volume was read. The codes are stable, for programs. One table holds their
-// meanings, which openapi.yaml repeats. Thread safe.
+// Notes on how a volume was read, and on how its mesh was made. The codes are stable, for programs.
+// One table holds their meanings, which openapi.yaml repeats. Thread safe.
 #pragma once
 
 #include <span>
@@ -39,6 +39,7 @@ enum class NoteCode {
   kLabelsRenumbered,      // labels of more than 32 bits; the samples have other numbers
   kChunksMissing,         // Zarr: some chunks are not there; their samples have the fill value
   kOrientationChanged,    // somebody flipped or turned the volume after its upload
+  kThinWalls,             // of a mesh: cavities are open because their walls are thin
 };
 
 struct NoteDescription {
@@ -51,6 +52,8 @@ struct NoteDescription {
   // The note concerns the origin of samples or geometry, so meshes carry it. Its detail then never
   // holds a name.
   bool is_in_mesh = false;
+  // The note is a mesh's own (MeshSummary::notes), and no volume has it.
+  bool is_of_mesh = false;
 };
 
 std::span<const NoteDescription> note_descriptions();

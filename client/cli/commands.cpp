@@ -238,7 +238,7 @@ int rename(Client& client, const Options& options) {
 
 int reorient(Client& client, const Options& options) {
   const Volume volume = client.reorient_volume(volume_id(client, options.id), options.axes);
-  tell_notes(volume, options, "");
+  tell_notes(volume.notes, options, "");
   options.json ? print_json(to_json(volume)) : print(volume.id + '\n');
   return kDone;
 }

@@ -94,9 +94,10 @@ void suggest_local() {
   complain("check --server, start isomeshd, or use `isomesh local`, which needs no server");
 }
 
-void tell_notes(const Volume& volume, const Options& options, const std::string& subject) {
+void tell_notes(const std::vector<Note>& notes, const Options& options,
+                const std::string& subject) {
   if (options.quiet) return;
-  for (const Note& note : volume.notes) {
+  for (const Note& note : notes) {
     // It advises --labels, which is given.
     const bool is_followed = note.code == describe(NoteCode::kLooksLikeLabels).name;
     if (is_followed && options.parameters.labels) continue;

@@ -38,7 +38,7 @@ void complain(const Error& error, const std::string& subject = {});
 // The hint for a user if no server responds.
 void suggest_local();
 
-// Reports the server's notes on a volume, unless `options` are quiet; `subject` as above.
-void tell_notes(const Volume& volume, const Options& options, const std::string& subject);
+// Reports the server's notes on a volume or a mesh, unless `options` are quiet; `subject` as above.
+void tell_notes(const std::vector<Note>& notes, const Options& options, const std::string& subject);
 
 }  // namespace isomesh::cli

@@ -207,7 +207,7 @@ int MeshRun::members(const Input& input, std::vector<UploadedVolume> volumes) {
 int MeshRun::stored(const std::string& id, const Input& input) {
   const Task task = task_of(input);
   const Volume found = client_.volume(volume_id(client_, id));
-  tell_notes(found, options_, task.subject);
+  tell_notes(found.notes, options_, task.subject);
   return mesh(found, task);
 }
 
@@ -289,7 +289,9 @@ void MeshRun::report(const Job& job, const std::vector<Output>& outputs, const T
   const bool has_mesh_on_stdout = std::ranges::any_of(outputs, &Output::is_stdout);
   if (options_.quiet || has_mesh_on_stdout) return;
   std::string text = outputs_report(job, outputs);
-  if (!is_one_of_many_) {
+  if (is_one_of_many_) {
+    tell_notes(job.mesh->notes, options_, task.subject);
+  } else {
     if (job.reused) text += "\nthe mesh was reused from an identical earlier job\n";
     text += '\n' + timing_report(job.timing, seen_) + '\n' +
             mesh_report(*with_labels(client_, job).mesh, unit_of(client_, job));

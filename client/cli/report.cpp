@@ -139,6 +139,11 @@ void tell_crossings(const MeshSummary& mesh, const Units& in, Rows& rows) {
   rows.push_back({"self-intersections", text});
 }
 
+void tell_notes(const std::vector<Note>& notes, Rows& rows) {
+  for (const Note& note : notes)
+    rows.push_back({"note", with_options(note.detail) + " (" + note.code + ')'});
+}
+
 void tell_thickness(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (!mesh.thickness) return;
   const Thickness& thickness = *mesh.thickness;
@@ -262,6 +267,7 @@ std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
   rows.push_back({"topology", topology_of(quality)});
   tell_crossings(mesh, in, rows);
   tell_thickness(mesh, in, rows);
+  tell_notes(mesh.notes, rows);
   rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
                                       fixed(quality.aspect_ratio.smoothed.mean, 3) + " smoothed"});
   rows.push_back({"smallest angle", fixed(quality.smallest_angle_deg.extracted.mean, 1) +
@@ -292,8 +298,7 @@ std::string volume_report(const Volume& volume) {
     rows.push_back({"iso of " + preset.name, human_number(preset.iso)});
   }
   rows.push_back({"created", volume.created});
-  for (const Note& note : volume.notes)
-    rows.push_back({"note", with_options(note.detail) + " (" + note.code + ')'});
+  tell_notes(volume.notes, rows);
   for (const IgnoredObject& object : volume.ignored) {
     rows.push_back({"ignored", object.name + ": " + object.reason});
   }

@@ -106,9 +106,10 @@ std::string shell_word(std::string_view text) {
 }
 
 std::string with_options(std::string text) {
-  constexpr std::array<std::array<std::string_view, 2>, 7> kOptions = {
+  constexpr std::array<std::array<std::string_view, 2>, 8> kOptions = {
       {{"\"labels\": \"all\"", "--labels all"},
        {"nifti_form=", "--nifti-form "},
+       {"scheme=", "--scheme "},
        {"member=NAME", "--member NAME"},
        {"series=UID", "--series UID"},
        {"volume=N", "--volume N"},

@@ -100,7 +100,7 @@ std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
   for (const UploadedVolume& each : volumes) {
     if (!each.volume) continue;
     const bool has_both = !subject.empty() && volumes.size() > 1;
-    tell_notes(*each.volume, options,
+    tell_notes(each.volume->notes, options,
                subject + (has_both ? ": " : "") + (volumes.size() > 1 ? each.member : ""));
   }
   return volumes;

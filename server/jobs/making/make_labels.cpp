@@ -12,6 +12,7 @@
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
+#include "server/jobs/making/thin_walls.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/stairs/stairs.h"
 
@@ -187,6 +188,7 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
       mesh::chosen_labels(count_values(samples, progress.context().part(0, 0.2)), parameters);
   const mesh::SeparateOptions options = separate_options(labels, parameters);
   separate(samples, options, request, progress, walls);
+  summary.notes = notes_on_thin_walls(samples, labels, parameters, progress.quiet());
   if (!is_simplified(parameters)) check_disk(size_of(walls.mesh), request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
   ExtractedSurface extracted(request, walls.mesh);

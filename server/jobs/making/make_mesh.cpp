@@ -12,6 +12,7 @@
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
+#include "server/jobs/making/thin_walls.h"
 #include "server/jobs/making/walk_stage.h"
 #include "server/mesh/measure/cavities.h"
 #include "server/mesh/parallel.h"
@@ -127,8 +128,13 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
   auto walked = walk_stage(samples, request, sinks, progress, mesh);
-  if (walked) return *std::move(walked);
+  std::vector<Note> notes = notes_on_thin_walls(samples, request, progress.quiet());
+  if (walked) {
+    walked->notes = std::move(notes);
+    return *std::move(walked);
+  }
   MeshSummary summary;
+  summary.notes = std::move(notes);
   summary.iso = request.iso;
   leave_out_parts(parameters, progress, mesh, summary.dropped);
   if (!is_simplified(parameters)) check_disk(size_of(mesh), request);

@@ -10,6 +10,7 @@
 
 #include "proto/samples.h"
 #include "server/mesh/extract/joined_layers.h"
+#include "server/mesh/extract/open_cavities.h"
 #include "server/mesh/extract/slab_passes.h"
 #include "server/mesh/extract/windows.h"
 #include "server/mesh/lattice/bcc_faces.h"
@@ -140,6 +141,23 @@ SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& opti
   return SurfaceWindows(lattice, options, context).take_count();
 }
 
+template <class T>
+SignRows sign_rows(const Lattice<T>& lattice, const ExtractOptions& options) {
+  SignRows signs = {.dims = lattice.dims, .classify = {}};
+  const auto smallest = smallest_inside<T>(options.iso);
+  if (!smallest) return signs;
+  ExtractOptions open = options;
+  open.close = false;
+  const std::shared_ptr<const SampleRows> rows = make_sample_rows(lattice, open, *smallest);
+  signs.classify = [rows](std::uint32_t y, std::uint32_t z, std::uint64_t* out) {
+    rows->classify(y, z, out);
+  };
+  signs.add_centres = [rows](std::uint32_t y, std::uint32_t z,
+                             std::span<const std::uint64_t> uncertain,
+                             std::uint64_t* out) { rows->add_centres(y, z, 0, uncertain, out); };
+  return signs;
+}
+
 void SurfaceWindows::write(std::uint32_t begin, std::uint32_t end, Mesh& mesh) {
   mesh.origin = to_space_.origin;
   const auto offsets = [&](const std::vector<std::uint64_t>& sums, std::uint32_t behind,
@@ -183,10 +201,11 @@ WritingMemory writing_memory(const ExtractOptions& options, std::uint64_t plane_
 
 void SurfaceWindows::forget(std::uint32_t begin, std::uint32_t end) { joined_->forget(begin, end); }
 
-#define ISOMESH_INSTANTIATE(T, name, kType)                                         \
-  template SurfaceWindows::SurfaceWindows(const Lattice<T>&, const ExtractOptions&, \
-                                          const Context&, Spool*);                  \
-  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&);
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                      \
+  template SurfaceWindows::SurfaceWindows(const Lattice<T>&, const ExtractOptions&,              \
+                                          const Context&, Spool*);                               \
+  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&); \
+  template SignRows sign_rows(const Lattice<T>&, const ExtractOptions&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

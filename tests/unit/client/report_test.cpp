@@ -88,6 +88,15 @@ TEST(MeshReport, TellsHowMuchIsThinAndTheThinnestWall) {
   EXPECT_THAT(mesh_report(mesh), HasSubstr("thin walls      none: "));
 }
 
+TEST(MeshReport, HasTheMeshsNotesWithOptions) {
+  MeshSummary mesh;
+  EXPECT_THAT(mesh_report(mesh), Not(HasSubstr("note")));
+  mesh.notes = {note_of(NoteCode::kThinWalls, "1 cavity is open. scheme=5 closes it.")};
+  EXPECT_THAT(mesh_report(mesh),
+              HasSubstr("note            1 cavity is open. --scheme 5 closes it. "
+                        "(thin-walls)\n"));
+}
+
 TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
   MeshSummary mesh;
   mesh.triangles = 7;

@@ -100,6 +100,7 @@ Job certified_job() {
   mesh.quality.encloses_volume = true;
   mesh.quality.self_intersections = {.pairs = 3, .triangles = 5, .places = {{1, 2, 3}}};
   mesh.thickness = {.thinnest_mm = 0.3, .place = {{1, 2, 3}}, .thin_area_mm2 = 12};
+  mesh.notes = {note_of(NoteCode::kThinWalls, "One cavity is open.")};
   mesh.certificate.emplace();
   mesh.certificate->file = MeshFormat::k3mf;
   mesh.certificate->found_mm = 0.09;

@@ -90,6 +90,7 @@ def mesh(
     if job["mesh"]["empty"]:
         volume: Any = {"range": [float(samples.min()), float(samples.max())]}
         warn(f"the surface is empty: {why_empty(job, volume)}")
+    warn_of_notes(job["mesh"].get("notes", []), "the mesh")
     return done
 
 

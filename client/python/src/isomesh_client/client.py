@@ -14,10 +14,10 @@ from urllib.parse import quote, urlencode
 
 from . import answers, busy, ply, uploads
 from .batches import Batches
-from .errors import IsomeshError, JobFailed, Refused, Unreachable, warn, warn_of_notes
+from .errors import IsomeshError, JobFailed, Refused, Unreachable, warn_of_notes
 from .exchange import Exchange
 from .files import FINAL_STATES, Arriving, file_of, files_of_mesh, format_of, written
-from .mesh import Mesh, why_empty
+from .mesh import Mesh, warn_of_mesh
 from .parameters import OMITTED, as_query, by_keywords, given
 from .transport import Transport
 
@@ -408,8 +408,7 @@ class Client(Batches):
                 parting._exchange = self._exchange.parting()
                 parting.cancel(parting._submit(stored, key, parameters))
             raise
-        if done["mesh"]["empty"]:
-            warn(f"the surface is empty: {why_empty(done, stored)}")
+        warn_of_mesh(done, stored)
         return stored, done
 
     def _stored(self, source: Any, of_upload: Mapping[str, Any]) -> Optional[api.Volume]:

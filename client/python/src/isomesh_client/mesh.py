@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, Optional, Sequence, Union
 
 from . import files, ply, viewer
+from .errors import warn, warn_of_notes
 
 if TYPE_CHECKING:
     import os
@@ -233,6 +234,13 @@ def read_ply(source: Union[bytes, bytearray, memoryview, str, os.PathLike[str]])
     """The mesh of a PLY file that isomesh wrote. Raises WrongAnswer for any other file."""
     data = source if isinstance(source, (bytes, bytearray, memoryview)) else Path(source).read_bytes()
     return Mesh(**ply.parse(data))
+
+
+def warn_of_mesh(job: api.SucceededJob, volume: api.Volume) -> None:
+    """Warns of an empty surface, and of each note on the mesh."""
+    if job["mesh"]["empty"]:
+        warn(f"the surface is empty: {why_empty(job, volume)}")
+    warn_of_notes(job["mesh"].get("notes", []), "the mesh")
 
 
 def why_empty(job: api.SucceededJob, volume: api.Volume) -> str:

@@ -94,6 +94,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
     ['Untangled', untangledText(mesh)],
     ['Self-intersections', intersectionsText(mesh)],
     ['Thinnest wall', thinnestText(mesh)],
+    ['Notes', mesh.notes?.map(({ detail }) => detail).join(' ') ?? ''],
     ['Moved by smoothing', job.parameters.passes > 0 ? `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm` : ''],
   ];
   if (mesh.dropped.components > 0) {

@@ -1,0 +1,173 @@
+#include "server/jobs/making/thin_walls.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "proto/samples.h"
+#include "server/jobs/making/mesh_stages.h"
+#include "server/mesh/extract/open_cavities.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Open = mesh::CavityCount::Open;
+
+// What a surface leaves open, and what another scheme would.
+struct ThinWalls {
+  Open open;
+  std::optional<Scheme> better = {};  // the scheme that leaves the fewest open
+  Open still_open = {};               // with that one
+
+  void add(const ThinWalls& other) {
+    open.cavities += other.open.cavities;
+    open.samples += other.open.samples;
+  }
+};
+
+// `others`: in the order of preference.
+ThinWalls find_thin_walls(const mesh::SignRows& rows, Scheme scheme, std::span<const Scheme> others,
+                          const mesh::Context& context) {
+  ThinWalls walls = {count_cavities(rows, std::array{scheme}, context).open.front()};
+  if (walls.open.cavities == 0) return walls;
+  const auto open = count_cavities(rows, others, context).open;
+  const auto least = std::ranges::min_element(open, {}, &Open::cavities);
+  if (least->cavities >= walls.open.cavities) return walls;
+  walls.better = others[static_cast<std::size_t>(least - open.begin())];
+  walls.still_open = *least;
+  return walls;
+}
+
+std::string cavities_text(std::uint64_t count) {
+  return std::to_string(count) + (count == 1 ? " cavity" : " cavities");
+}
+
+std::string open_text(const Open& open) {
+  return cavities_text(open.cavities) + " of " + std::to_string(open.samples) + " voxels that " +
+         (open.cavities == 1 ? "is" : "are") + " closed by faces of voxels " +
+         (open.cavities == 1 ? "is" : "are") + " open in the surface";
+}
+
+std::string remedy_text(const ThinWalls& walls) {
+  if (!walls.better) return "No other scheme closes more of them.";
+  const std::string scheme =
+      "scheme=" + std::string(to_string(static_cast<SchemeName>(*walls.better)));
+  if (walls.still_open.cavities > 0) {
+    return scheme + " leaves " + std::to_string(walls.still_open.cavities) + " of them open.";
+  }
+  return scheme + " closes " + (walls.open.cavities == 1 ? "it." : "them.");
+}
+
+constexpr std::string_view kCause =
+    "Walls are thinner there than the longest edges of the lattice. ";
+
+// Those of the schemes that are not the job's.
+std::vector<Scheme> others_of(std::vector<Scheme> schemes, Scheme scheme) {
+  std::erase(schemes, scheme);
+  return schemes;
+}
+
+// The rows of a label in its box and a sample around it, where the volume has one.
+template <class T>
+mesh::SignRows rows_of(const mesh::Lattice<T>& lattice, const mesh::LabelVoxels& label,
+                       const std::vector<std::int64_t>& values) {
+  const std::array dims = {lattice.dims.x, lattice.dims.y, lattice.dims.z};
+  std::array<std::uint32_t, 3> low = label.low;
+  std::array<std::uint32_t, 3> size = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis] -= std::min<std::uint32_t>(low[axis], 1);
+    size[axis] = std::min(label.high[axis] + 2, dims[axis]) - low[axis];
+  }
+  std::vector<T> own;
+  for (const std::int64_t value : values) {
+    if (std::in_range<T>(value)) own.push_back(static_cast<T>(value));
+  }
+  const auto classify = [=](std::uint32_t y, std::uint32_t z, std::uint64_t* out) {
+    const std::size_t row = (std::size_t{z + low[2]} * lattice.dims.y + y + low[1]);
+    const T* samples = lattice.samples + row * lattice.dims.x + low[0];
+    for (std::uint32_t begin = 0; begin < size[0]; begin += mesh::kFlagBits) {
+      const auto count = std::min<std::uint32_t>(mesh::kFlagBits, size[0] - begin);
+      std::uint64_t word = 0;
+      for (const T value : own) {
+        for (std::uint32_t x = 0; x < count; ++x) {
+          word |= std::uint64_t{samples[begin + x] == value} << x;
+        }
+      }
+      *out++ = word;
+    }
+  };
+  return {.dims = {size[0], size[1], size[2]},
+          .parity = (low[0] + low[1] + low[2]) & 1,
+          .classify = classify};
+}
+
+}  // namespace
+
+std::vector<Note> notes_on_thin_walls(const SampleArray& samples, const MeshRequest& request,
+                                      const mesh::Context& context) {
+  const MeshParameters& parameters = request.parameters;
+  return with_sample(samples.type, [&](auto sample) -> std::vector<Note> {
+    const auto lattice = lattice_of<decltype(sample)>(samples);
+    if (!parameters.fill_cavities && parameters.components.keeps_all() &&
+        !is_mask(lattice, context)) {
+      return {};
+    }
+    const mesh::ExtractOptions options = extract_options(parameters, request.iso);
+    const auto others = others_of({Scheme::kFive, Scheme::kBcc, Scheme::kSix}, options.scheme);
+    const ThinWalls walls =
+        find_thin_walls(sign_rows(lattice, options), options.scheme, others, context);
+    if (walls.open.cavities == 0) return {};
+    const std::string unfilled = parameters.fill_cavities ? ", and not filled. " : ". ";
+    return {note_of(NoteCode::kThinWalls,
+                    open_text(walls.open) + unfilled + std::string(kCause) + remedy_text(walls))};
+  });
+}
+
+std::vector<Note> notes_on_thin_walls(const SampleArray& samples,
+                                      std::span<const mesh::LabelVoxels> labels,
+                                      const MeshParameters& parameters,
+                                      const mesh::Context& context) {
+  const Scheme scheme = scheme_of(parameters.scheme);
+  const auto others = others_of({Scheme::kFive, Scheme::kSix}, scheme);
+  std::vector<ThinWalls> found(labels.size());
+  with_sample(samples.type, [&](auto sample) {
+    using T = decltype(sample);
+    if constexpr (std::is_integral_v<T>) {
+      const auto lattice = lattice_of<T>(samples);
+      mesh::parallel_for(context, labels.size(), [&](std::size_t n) {
+        const auto values = parameters.label_values.find(labels[n].label);
+        const std::vector<std::int64_t> own =
+            values == parameters.label_values.end() ? std::vector{labels[n].label} : values->second;
+        found[n] = find_thin_walls(rows_of(lattice, labels[n], own), scheme, others, context);
+      });
+    }
+  });
+  std::vector<Note> notes;
+  constexpr std::size_t kMostTold = 8;
+  ThinWalls rest;
+  std::uint64_t further = 0;
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    if (found[n].open.cavities == 0) continue;
+    if (notes.size() < kMostTold) {
+      notes.push_back(note_of(NoteCode::kThinWalls, "Label " + std::to_string(labels[n].label) +
+                                                        ": " + open_text(found[n].open) + ". " +
+                                                        std::string(kCause) +
+                                                        remedy_text(found[n])));
+    } else {
+      ++further;
+      rest.add(found[n]);
+    }
+  }
+  if (further > 0) {
+    notes.push_back(note_of(NoteCode::kThinWalls, std::to_string(further) + " more labels: " +
+                                                      open_text(rest.open) + '.'));
+  }
+  return notes;
+}
+
+}  // namespace isomesh::jobs

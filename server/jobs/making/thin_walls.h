@@ -1,0 +1,27 @@
+// Notes on walls that are too thin for the lattice; private to this folder.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "proto/notes.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/sample_array.h"
+#include "server/mesh/context.h"
+#include "server/mesh/labels/label_voxels.h"
+
+namespace isomesh::jobs {
+
+// The note thin-walls, if cavities that voxels close are open in the surface at the job's iso-value
+// (open_cavities.h). Looks for them only where it matters: in a mask, or if the job fills cavities
+// or keeps some components. Throws Error kCancelled.
+std::vector<Note> notes_on_thin_walls(const SampleArray& samples, const MeshRequest& request,
+                                      const mesh::Context& context);
+
+// The same for each label's own surface, in the box of its samples. `labels`: all of the job.
+std::vector<Note> notes_on_thin_walls(const SampleArray& samples,
+                                      std::span<const mesh::LabelVoxels> labels,
+                                      const MeshParameters& parameters,
+                                      const mesh::Context& context);
+
+}  // namespace isomesh::jobs
