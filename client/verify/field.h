@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "client/verify/surface.h"
+#include "proto/parameters.h"
 #include "server/import/message/import_message.h"
 
 namespace isomesh::verify {
@@ -38,10 +39,22 @@ struct Cut {
   int tetrahedra = 6;     // of a cell: 6 (Kuhn's split) or 5
   bool close = false;     // the field is infinitely low outside of the volume
   bool midpoint = false;  // only the sign of the field counts
+  bool fill = false;      // cavities are filled
 };
 
+// Raises the samples of cavities, and of what floats in them, so that the zero set has no walls
+// there. A cavity is below the iso-value, and no path along edges of tetrahedra leads from it to
+// the border of the volume.
+void fill_cavities(const Cut& cut, Field& field);
+
 // The set where the field is `iso`, linear in each tetrahedron. Triangles face lower values; some
-// have no area, where a sample has that value or the surface is closed.
+// have no area, where a sample has that value or the surface is closed. Points are in the order of
+// the samples that own their edges, x fastest, and then of the directions.
 Surface zero_set(const Field& field, const Cut& cut);
+
+// Leaves other components out, as a job does: keeps those of the points nearest to
+// `filter.nearest_to`, if there are any; of these, those of at least `filter.min_triangles`; of
+// these, the `filter.keep` with the most triangles, of equal ones those of the first points.
+void keep_components(const ComponentFilter& filter, Surface& surface);
 
 }  // namespace isomesh::verify

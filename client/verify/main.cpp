@@ -30,22 +30,45 @@ struct Arguments {
   std::vector<double> crop;
 };
 
+std::array<double, 3> point_from(const std::string& text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  std::array<double, 3> point = {};
+  for (std::size_t axis = 0; axis < point.size(); ++axis) {
+    const auto number = axis < parts.size() ? parse_double(parts[axis]) : std::nullopt;
+    if (!number || parts.size() != point.size()) {
+      throw CLI::ValidationError("--keep-nearest-to", "a point is three numbers, X,Y,Z");
+    }
+    point[axis] = *number;
+  }
+  return point;
+}
+
 void add_options(CLI::App& app, Arguments& all) {
   const auto add = [&](const char* name, auto& value, const char* type, const char* help) {
     return app.add_option(name, value, help)->type_name(type);
   };
   add("FILE", all.mesh, "FILE", "The mesh: STL, PLY or GLB, without a codec")->required();
   add("--volume", all.volume, "FILE", "Its volume: a file, a folder or an archive")->required();
-  add("--iso", all.cut.iso, "VALUE", "The iso-value of the job")->required();
-  add("--bound", all.question.bound, "MM", "The distance, such as the job's --max-error")
-      ->required();
+  add("--iso", all.cut.iso, "VALUE", "The iso-value of the job");
+  add("--bound", all.question.bound, "MM", "The distance, such as the job's --max-error");
   add("--scheme", all.cut.tetrahedra, "5|6", "As in the job")->check(CLI::IsMember({5, 6}));
   add("--crop", all.crop, "X,Y,Z,X,Y,Z", "As in the job; closes")->delimiter(',')->expected(6);
   app.add_flag("--close", all.cut.close, "The job closed the surface at the volume's border");
   app.add_flag("--midpoint", all.cut.midpoint, "The job had --interpolation midpoint");
-  app.add_flag(
-      "--keep-components,--fill-cavities", all.question.some_parts,
-      "Components of the surface may be missing if the mesh comes near to none of their points");
+  app.add_flag("--fill-cavities", all.cut.fill, "As in the job");
+  add("--keep-components", all.question.components.keep, "N", "As in the job: the N largest")
+      ->check(CLI::PositiveNumber);
+  add("--min-component-triangles", all.question.components.min_triangles, "N", "As in the job")
+      ->check(CLI::PositiveNumber);
+  app.add_option_function<std::vector<std::string>>(
+         "--keep-nearest-to",
+         [&all](const std::vector<std::string>& places) {
+           for (const std::string& place : places) {
+             all.question.components.nearest_to.push_back(point_from(place));
+           }
+         },
+         "As in the job, several times for several points")
+      ->type_name("X,Y,Z");
   add("--series", all.import.series, "UID", "The DICOM series, if there are several");
   add("--member", all.import.member, "NAME", "The archive's member, if there are several");
   add("--accept", all.import.accept, "CODE,..", "Accept these notes on the volume")->delimiter(',');
@@ -55,13 +78,45 @@ void add_options(CLI::App& app, Arguments& all) {
   app.set_version_flag("-V,--version", "isomesh-verify " ISOMESH_VERSION, "Print it and exit");
 }
 
-int run(Arguments& all) {
+// Options that are not given follow the job that made the file, if that says so.
+void follow(const MeshParameters& made, const CLI::App& app, Arguments& all) {
+  if (made.labels || made.scheme == SchemeName::kBcc) {
+    throw invalid_parameter("file", "files of labels and of scheme bcc cannot be checked");
+  }
+  const auto is_open = [&](const char* option) { return app.count(option) == 0; };
+  if (is_open("--iso")) all.cut.iso = made.iso.value_or(0);
+  if (is_open("--bound") && made.max_error_mm) all.question.bound = *made.max_error_mm;
+  if (is_open("--scheme")) all.cut.tetrahedra = made.scheme == SchemeName::kFive ? 5 : 6;
+  if (is_open("--close")) all.cut.close = made.close;
+  if (is_open("--midpoint")) all.cut.midpoint = made.interpolation == Interpolation::kMidpoint;
+  if (is_open("--fill-cavities")) all.cut.fill = made.fill_cavities;
+  if (is_open("--crop") && made.crop) {
+    for (const auto& corner : *made.crop)
+      all.crop.insert(all.crop.end(), corner.begin(), corner.end());
+  }
+  ComponentFilter& filter = all.question.components;
+  if (is_open("--keep-components")) filter.keep = made.components.keep;
+  if (is_open("--min-component-triangles")) filter.min_triangles = made.components.min_triangles;
+  if (is_open("--keep-nearest-to")) filter.nearest_to = made.components.nearest_to;
+}
+
+int run(const CLI::App& app, Arguments& all) {
   verify::Cut& cut = all.cut;
+  const InputFile file = InputFile::chosen(all.mesh);
+  const std::string bytes = file.text(0, file.size());
+  const auto made = verify::read_parameters(bytes);
+  if (made) follow(*made, app, all);
+  const auto require = [&](const char* option, bool is_told) {
+    if (app.count(option) > 0 || is_told) return;
+    throw Error(ErrorCode::kInvalidParameter,
+                std::string(option) + " is required; the file does not tell it");
+  };
+  require("--iso", made && made->iso);
+  require("--bound", made && made->max_error_mm);
   if (!(all.question.bound > 0) || !std::isfinite(all.question.bound + cut.iso)) {
     throw invalid_parameter("bound", "the bound must be positive, and the iso-value finite");
   }
-  const InputFile file = InputFile::chosen(all.mesh);
-  verify::Surface mesh = verify::read_surface(file.text(0, file.size()));
+  verify::Surface mesh = verify::read_surface(bytes);
   verify::Field field = verify::read_field(all.volume, all.import);
   if (!all.crop.empty()) {
     field = field.cropped({verify::Vec{all.crop[0], all.crop[1], all.crop[2]},
@@ -69,6 +124,7 @@ int run(Arguments& all) {
     cut.close = true;
   }
   all.question.is_closed = cut.close;
+  if (cut.fill) verify::fill_cavities(cut, field);
   verify::Surface surface = verify::zero_set(field, cut);
   const verify::Verdict verdict = verify::verify(mesh, surface, field, all.question);
   std::cout << verdict.text << std::flush;
@@ -92,7 +148,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     app.parse(argc, argv);
-    return run(arguments);
+    return run(app, arguments);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kBadInput;
   } catch (const std::exception& error) {

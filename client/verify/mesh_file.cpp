@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "client/verify/verify.h"
 #include "proto/json_tree.h"
+#include "proto/json_values.h"
 
 namespace isomesh::verify {
 namespace {
@@ -154,13 +155,19 @@ std::string_view items(const Json& gltf, std::string_view binary, std::uint64_t 
   return binary.substr(begin, size);
 }
 
-// The scene's only node turns millimetres in LPS into metres with Y up, and holds one primitive.
-Surface read_glb(std::string_view bytes) {
+// The first chunk of the file, which is removed with all before it.
+JsonTree take_json(std::string_view& bytes) {
   if (bytes.size() < 12 || at<std::uint32_t>(bytes, 8) != bytes.size()) {
     refuse("the GLB has another size than its header says");
   }
-  std::string_view rest = bytes.substr(12);
-  const JsonTree tree(take_chunk(rest, "JSON"));
+  bytes.remove_prefix(12);
+  return JsonTree(take_chunk(bytes, "JSON"));
+}
+
+// The scene's only node turns millimetres in LPS into metres with Y up, and holds one primitive.
+Surface read_glb(std::string_view bytes) {
+  std::string_view rest = bytes;
+  const JsonTree tree = take_json(rest);
   const Json& gltf = tree.root();
   Surface surface;
   if (find(gltf, "extensionsRequired") != nullptr) refuse("the GLB has a codec; ask for none");
@@ -202,7 +209,30 @@ void join_equal_points(Surface& surface) {
   }
 }
 
+// The reader of JSON leaves out the subject.
+[[noreturn]] void refuse_glb(const Error& error) {
+  if (error.code() == ErrorCode::kInvalidParameter) throw error;
+  refuse(std::string("the GLB ") + error.what());
+}
+
 }  // namespace
+
+std::optional<MeshParameters> read_parameters(std::string_view bytes) try {
+  if (!bytes.starts_with("glTF")) return std::nullopt;
+  JsonTree tree = take_json(bytes);
+  const Json* const asset = find(tree.root(), "asset");
+  const Json* const extras = asset == nullptr ? nullptr : find(*asset, "extras");
+  if (extras == nullptr || find(*extras, "parameters") == nullptr) return std::nullopt;
+  MeshParameters parameters;
+  Json& told = member(member(member(tree.root(), "asset"), "extras"), "parameters");
+  // A file does not say which others there were.
+  write_field(told, rows::kFormats, parameters.formats);
+  read_members(told, parameters);
+  if (const Json* iso = find(*extras, "iso")) parameters.iso = number(*iso);
+  return parameters;
+} catch (const Error& error) {
+  refuse_glb(error);
+}
 
 Surface read_surface(std::string_view bytes) try {
   const bool is_glb = bytes.starts_with("glTF");
@@ -223,9 +253,7 @@ Surface read_surface(std::string_view bytes) try {
   join_equal_points(surface);
   return surface;
 } catch (const Error& error) {
-  // The reader of JSON leaves out the subject.
-  if (error.code() == ErrorCode::kInvalidParameter) throw;
-  refuse(std::string("the GLB ") + error.what());
+  refuse_glb(error);
 }
 
 }  // namespace isomesh::verify

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <sstream>
 #include <thread>
-#include <unordered_set>
 #include <utility>
 
 namespace isomesh::verify {
@@ -129,35 +128,44 @@ std::string text_of(const Vec& p) {
   return text.str();
 }
 
+// The connected components of a surface, by size.
+class Components {
+ public:
+  explicit Components(const Surface& surface) : of_point_(components_of(surface)) {
+    std::vector<std::uint64_t> sizes(of_point_.size());
+    for (const Indices& triangle : surface.triangles) ++sizes[of_point_[triangle[0]]];
+    for (std::uint32_t n = 0; n < sizes.size(); ++n) {
+      if (sizes[n] > 0) by_size_.emplace_back(sizes[n], n);
+    }
+    std::ranges::stable_sort(by_size_, std::greater{}, [](const auto& one) { return one.first; });
+  }
+
+  std::size_t count() const { return by_size_.size(); }
+
+  // Names the component of a triangle with that corner.
+  std::string name_of(std::uint32_t corner) const {
+    const auto found =
+        std::ranges::find(by_size_, of_point_[corner], [](const auto& one) { return one.second; });
+    return "component " + std::to_string(found - by_size_.begin() + 1) + " of " +
+           std::to_string(count()) + ", of " + std::to_string(found->first) + " triangles";
+  }
+
+ private:
+  std::vector<std::uint32_t> of_point_;
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> by_size_;  // triangles, component
+};
+
 class Verifier {
  public:
   Verifier(Surface& mesh, Surface& surface, const Field& field, const Question& question)
-      : field_(field), question_(question), mesh_(mesh), surface_(surface) {}
+      : field_(field), question_(question), mesh_(mesh), surface_(without(surface)) {}
 
   Verdict run() {
     const Surface& surface = surface_.surface();
     const Direction there = look(mesh_.surface(), surface_, question_.bound);
-    Direction back = look(surface, mesh_, question_.bound);
-    const auto components = components_of(surface);
-    const auto component_of = [&](std::uint32_t t) { return components[surface.triangles[t][0]]; };
-    std::unordered_set<std::uint32_t> all;
-    std::unordered_set<std::uint32_t> met;
-    for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) all.insert(component_of(t));
-    for (const Nearest& near : there.nearest) {
-      const bool is_near = near.squared <= question_.bound * question_.bound;
-      if (is_near) met.insert(component_of(near.triangle));
-    }
-    text_ << "The mesh has " << mesh_.surface().triangles.size() << " triangles, the surface "
-          << surface.triangles.size() << " in " << all.size()
-          << " components, of which the mesh comes near to " << met.size() << ".\n";
-    // Nothing at all is no part.
-    if (question_.some_parts && !met.empty()) {
-      std::erase_if(back.findings, [&](const Finding& finding) {
-        return !met.contains(component_of(finding.triangle));
-      });
-    }
-    tell("mesh to the surface", there);
-    tell("surface to the mesh", back);
+    const Direction back = look(surface, mesh_, question_.bound);
+    tell("mesh to the surface", there, mesh_.surface(), "the mesh's ");
+    tell("surface to the mesh", back, surface, "the surface's ");
     check_edges();
     check_sides(there.nearest);
     text_ << (holds_ ? "PASSED: every point is within " : "FAILED: see above; the bound is ")
@@ -166,7 +174,22 @@ class Verifier {
   }
 
  private:
-  void tell(const char* ways, const Direction& direction) {
+  // Removes components that the mesh need not have.
+  Surface& without(Surface& surface) {
+    const std::size_t triangles = surface.triangles.size();
+    const std::size_t components = Components(surface).count();
+    keep_components(question_.components, surface);
+    text_ << "The mesh has " << mesh_.surface().triangles.size() << " triangles, the surface "
+          << triangles << " in " << components << " components";
+    if (!question_.components.keeps_all()) {
+      text_ << ", of which the job keeps " << Components(surface).count() << ", of "
+            << surface.triangles.size() << " triangles";
+    }
+    text_ << ".\n";
+    return surface;
+  }
+
+  void tell(const char* ways, const Direction& direction, const Surface& from, const char* whose) {
     const auto& findings = direction.findings;
     text_ << "From the " << ways << ": ";
     if (findings.empty()) text_ << "every point is within " << question_.bound << " mm.\n";
@@ -175,6 +198,7 @@ class Verifier {
     const auto far = std::ranges::count_if(findings, &Finding::is_far);
     text_ << far << " triangles have points farther than " << question_.bound << " mm, "
           << findings.size() - static_cast<std::size_t>(far) << " are undecided:\n";
+    const Components components(from);
     // Findings beside each other tell the same.
     std::vector<Vec> told;
     for (const Finding& each : findings) {
@@ -184,7 +208,8 @@ class Verifier {
       if (told.size() == 10 || std::ranges::any_of(told, is_beside)) continue;
       told.push_back(each.place);
       text_ << "  " << each.distance << " mm" << text_of(each.place)
-            << (each.is_far ? "\n" : ", undecided\n");
+            << (each.is_far ? ", in " : ", undecided, in ") << whose
+            << components.name_of(from.triangles[each.triangle][0]) << '\n';
     }
   }
 
@@ -263,10 +288,10 @@ class Verifier {
 
   const Field& field_;
   const Question question_;
-  const Tree mesh_;
-  const Tree surface_;
   bool holds_ = true;
   std::ostringstream text_;
+  const Tree mesh_;
+  const Tree surface_;
 };
 
 }  // namespace

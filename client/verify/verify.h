@@ -1,6 +1,7 @@
 // Holds a mesh against the surface of a volume.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -14,10 +15,14 @@ namespace isomesh::verify {
 // bytes, truncated ones, and coordinates that are not finite.
 Surface read_surface(std::string_view bytes);
 
+// The parameters of the job, which GLB files of isomesh carry. None for other files. Throws as
+// read_surface.
+std::optional<MeshParameters> read_parameters(std::string_view bytes);
+
 struct Question {
-  double bound = 0;         // in millimetres
-  bool is_closed = false;   // an open edge is a fault also on the border of the volume
-  bool some_parts = false;  // components of the surface may be missing as a whole
+  double bound = 0;                 // in millimetres
+  bool is_closed = false;           // an open edge is a fault also on the border of the volume
+  ComponentFilter components = {};  // which components of the surface the mesh must have
 };
 
 struct Verdict {
@@ -26,7 +31,8 @@ struct Verdict {
 };
 
 // Holds if every point of each surface is within the bound of the other one, the edges of the mesh
-// fit together, and no component of it is inside out. `surface` is the field's zero set.
+// fit together, and no component of it is inside out. `surface` is the field's zero set; components
+// that the filter leaves out are removed.
 Verdict verify(Surface& mesh, Surface& surface, const Field& field, const Question& question);
 
 }  // namespace isomesh::verify

@@ -1,6 +1,7 @@
 // Marching tetrahedra, a layer of cells after the other.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "client/verify/field.h"
@@ -44,6 +45,7 @@ class March {
         }
       }
     }
+    put_in_order();
     return std::move(surface_);
   }
 
@@ -78,6 +80,11 @@ class March {
     std::uint32_t& number = points(cell_[2] + (owner >> 2))[in_plane(owner)][inside ^ outside];
     if (number == kNoVertex) {
       number = static_cast<std::uint32_t>(surface_.points.size());
+      const auto& [nx, ny, nz] = field_.dims;
+      const std::size_t plane = static_cast<std::size_t>(nx * ny);
+      names_.push_back(
+          8 * (static_cast<std::size_t>(cell_[2] + (owner >> 2)) * plane + in_plane(owner)) +
+          (inside ^ outside));
       const double share = value(inside) / (value(inside) - value(outside));
       surface_.points.push_back(place(inside) + share * (place(outside) - place(inside)));
     }
@@ -114,10 +121,28 @@ class March {
     std::swap(surface_.triangles.back()[1], surface_.triangles.back()[2]);
   }
 
+  void put_in_order() {
+    std::vector<std::uint32_t> order(names_.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::sort(order, {}, [&](std::uint32_t point) { return names_[point]; });
+    std::vector<std::uint32_t> numbers(order.size());
+    std::vector<Vec> points;
+    points.reserve(order.size());
+    for (const std::uint32_t point : order) {
+      numbers[point] = static_cast<std::uint32_t>(points.size());
+      points.push_back(surface_.points[point]);
+    }
+    surface_.points = std::move(points);
+    for (Indices& triangle : surface_.triangles) {
+      for (std::uint32_t& corner : triangle) corner = numbers[corner];
+    }
+  }
+
   const Field& field_;
   const Cut cut_;
   Sample cell_ = {0, 0, 0};
   std::array<std::vector<std::array<std::uint32_t, 8>>, 2> points_;
+  std::vector<std::size_t> names_;  // of the points: the edge's owner, and its direction there
   Surface surface_;
 };
 

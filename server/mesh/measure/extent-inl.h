@@ -44,6 +44,13 @@ struct TwoPoints {
   Double2 z;
 };
 
+// True if a triangle with these two sides and this normal, their product, has an area that rounding
+// may have made: an angle below 2^-48. Corners in single precision that are not in line have larger
+// ones as a rule, while the product of sides that are need not come out as zero.
+inline auto is_flat(const TwoPoints& side, const TwoPoints& other, const TwoPoints& normal) {
+  return normal.dot(normal) <= 0x1p-96 * (side.dot(side) * other.dot(other));
+}
+
 class LayerExtent {
  public:
   // `corner` gives the position of a vertex as a Float4.
@@ -53,13 +60,14 @@ class LayerExtent {
     const TwoPoints apex = {{origin[0], origin[0]}, {origin[1], origin[1]}, {origin[2], origin[2]}};
     Double2 areas = {};
     Double2 volumes = {};
-    decltype(areas == 0) is_flat = {};
+    decltype(areas == 0) flat = {};
     const auto add_two = [&](const Triangle& first, const Triangle& second) {
       const auto at = TwoPoints::of(corner(first[0]), corner(second[0]));
-      const TwoPoints normal = (TwoPoints::of(corner(first[1]), corner(second[1])) - at)
-                                   .cross(TwoPoints::of(corner(first[2]), corner(second[2])) - at);
+      const TwoPoints side = TwoPoints::of(corner(first[1]), corner(second[1])) - at;
+      const TwoPoints other = TwoPoints::of(corner(first[2]), corner(second[2])) - at;
+      const TwoPoints normal = side.cross(other);
       const Double2 squares = normal.dot(normal);
-      is_flat |= squares == 0;
+      flat |= is_flat(side, other, normal);
       areas += Double2{std::sqrt(squares[0]), std::sqrt(squares[1])};
       volumes += (at - apex).dot(normal);
     };
@@ -67,11 +75,11 @@ class LayerExtent {
     for (; t + 1 < triangles.size(); t += 2) add_two(triangles[t], triangles[t + 1]);
     if (t < triangles.size()) {
       const std::uint32_t any = triangles[t][0];
-      const auto second = is_flat[1];
+      const auto second = flat[1];
       add_two(triangles[t], {any, any, any});  // a filler without area
-      is_flat[1] = second;
+      flat[1] = second;
     }
-    has_flat_ |= (is_flat[0] | is_flat[1]) != 0;
+    has_flat_ |= (flat[0] | flat[1]) != 0;
     area_ += (areas[0] + areas[1]) / 2;
     volume_ += (volumes[0] + volumes[1]) / 6;
   }
@@ -109,9 +117,9 @@ class LayerExtent {
 // True for the triangles that make has_flat() true.
 inline bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const auto point = [](const Vec3& at) { return TwoPoints::of(load(at), load(at)); };
-  const TwoPoints at = point(a);
-  const TwoPoints normal = (point(b) - at).cross(point(c) - at);
-  return normal.dot(normal)[0] == 0;
+  const TwoPoints side = point(b) - point(a);
+  const TwoPoints other = point(c) - point(a);
+  return is_flat(side, other, side.cross(other))[0] != 0;
 }
 
 inline bool has_no_area(const Mesh& mesh, const Triangle& triangle) {

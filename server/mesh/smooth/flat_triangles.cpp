@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <unordered_map>
 #include <utility>
 #include <vector>
+
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -36,41 +39,103 @@ struct TwoLayers {
   LayerView high;
 };
 
-// Moves a vertex by about the rounding of its position, such that its triangles have areas. Returns
-// false if there is no such move, or if the vertex is not free.
-bool nudge(std::size_t index, std::ptrdiff_t layer, const SmoothedLayers& layers) {
-  const LayerView own = layers.view(layer);
-  Vec3* const vertex = own.positions + index;
-  std::vector<Corners> around;
+// The triangles around a vertex.
+struct Surroundings {
+  std::vector<Corners> triangles;
   std::int64_t next_minus_previous = 0;  // not 0 on the boundary of a manifold
-  float largest = 0;
-  for (std::ptrdiff_t n = std::max<std::ptrdiff_t>(0, layer - 1); n <= layer; ++n) {
-    const TwoLayers two(n, layers);
+};
+
+// The corners of a layer's flat triangles, with all triangles around them.
+class FlatCorners {
+ public:
+  FlatCorners(std::ptrdiff_t layer, const SmoothedLayers& layers) : layers_(layers) {
+    const TwoLayers two(layer, layers);
     for (const Triangle& triangle : two.low.triangles()) {
       const Corners corners = two.corners(triangle);
-      const std::size_t corner = std::ranges::find(corners, vertex) - corners.begin();
-      if (corner == corners.size()) continue;
-      around.push_back(corners);
-      next_minus_previous += std::int64_t{triangle[(corner + 1) % 3]} - triangle[(corner + 2) % 3];
+      if (!is_without_area(corners)) continue;
+      for (std::size_t n = 0; n < 3; ++n) {
+        const std::ptrdiff_t of_corner = two.is_high(triangle[n]) ? layer + 1 : layer;
+        flat_.push_back({corners[n], two.index(triangle[n]), of_corner});
+        fans_.try_emplace(corners[n]);
+      }
+    }
+    if (fans_.empty()) return;
+    for (std::ptrdiff_t n = std::max<std::ptrdiff_t>(0, layer - 1);
+         n <= std::min(layer + 1, layers.count() - 1); ++n) {
+      add_triangles(TwoLayers(n, layers));
+    }
+  }
+
+  // Moves a corner of each triangle that is flat still: a free one if there is any, else one on a
+  // curve or the boundary. The latter stay if the surface is closed, so caps stay flat.
+  void open() {
+    for (std::size_t first = 0; first < flat_.size(); first += 3) {
+      if (!is_without_area({flat_[first].at, flat_[first + 1].at, flat_[first + 2].at})) continue;
+      std::array<Corner, 3> corners = {flat_[first], flat_[first + 1], flat_[first + 2]};
+      std::ranges::stable_sort(corners, {}, [&](const Corner& c) { return rank(c); });
+      for (const Corner& corner : corners) {
+        if (rank(corner) == kFixed || !nudge(*corner.at)) continue;
+        layers_.result(corner.layer).was_nudged = true;
+        break;
+      }
+    }
+  }
+
+ private:
+  enum Rank : std::uint8_t { kFree, kOnCurve, kOnBoundary, kFixed };
+
+  struct Corner {
+    Vec3* at = nullptr;
+    std::size_t index = 0;  // in its layer
+    std::ptrdiff_t layer = 0;
+  };
+
+  void add_triangles(const TwoLayers& two) {
+    for (const Triangle& triangle : two.low.triangles()) {
+      const Corners corners = two.corners(triangle);
+      for (std::size_t n = 0; n < 3; ++n) {
+        const auto found = fans_.find(corners[n]);
+        if (found == fans_.end()) continue;
+        found->second.triangles.push_back(corners);
+        found->second.next_minus_previous +=
+            std::int64_t{triangle[(n + 1) % 3]} - triangle[(n + 2) % 3];
+      }
+    }
+  }
+
+  Rank rank(const Corner& corner) const {
+    const LayerView own = layers_.view(corner.layer);
+    const std::size_t number = own.first() + corner.index;
+    if (own.mesh->is_on_border(number)) return kFixed;
+    if (own.mesh->is_on_line(number)) return kOnCurve;
+    return fans_.at(corner.at).next_minus_previous == 0 ? kFree : kOnBoundary;
+  }
+
+  // Moves a vertex by about the rounding of its position, such that its triangles have areas.
+  // Returns false if there is no such move.
+  bool nudge(Vec3& vertex) const {
+    const std::vector<Corners>& around = fans_.at(&vertex).triangles;
+    float largest = 0;
+    for (const Corners& corners : around) {
       for (const Vec3* each : corners) {
         for (const float at : *each) largest = std::max(largest, std::abs(at));
       }
     }
-  }
-  const std::size_t number = own.first() + index;
-  if (next_minus_previous != 0 || own.mesh->is_on_border(number) || own.mesh->is_on_line(number)) {
+    const Vec3 before = vertex;
+    for (const float step : {largest * 0x1p-22F, -largest * 0x1p-22F}) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        vertex[axis] = before[axis] + step;
+        if (std::ranges::none_of(around, is_without_area)) return true;
+        vertex = before;
+      }
+    }
     return false;
   }
-  const Vec3 before = *vertex;
-  for (const float step : {largest * 0x1p-22F, -largest * 0x1p-22F}) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      (*vertex)[axis] = before[axis] + step;
-      if (std::ranges::none_of(around, is_without_area)) return true;
-      *vertex = before;
-    }
-  }
-  return false;
-}
+
+  const SmoothedLayers& layers_;
+  std::vector<Corner> flat_;  // three for each flat triangle
+  std::unordered_map<const Vec3*, Surroundings> fans_;
+};
 
 }  // namespace
 
@@ -111,17 +176,27 @@ void measure_again(std::ptrdiff_t layer, bool SmoothedLayer::*was_moved,
 }
 
 void nudge_flat(std::ptrdiff_t layer, const SmoothedLayers& layers) {
-  if (!layers.result(layer).after.has_flat()) return;
-  const TwoLayers two(layer, layers);
-  for (const Triangle& triangle : two.low.triangles()) {
-    if (!is_without_area(two.corners(triangle))) continue;
-    for (const std::uint32_t vertex : triangle) {
-      const std::ptrdiff_t of_vertex = two.is_high(vertex) ? layer + 1 : layer;
-      if (!nudge(two.index(vertex), of_vertex, layers)) continue;
-      layers.result(of_vertex).was_nudged = true;
-      break;
+  if (layers.result(layer).after.has_flat()) FlatCorners(layer, layers).open();
+}
+
+Extent open_flat(const Context& context, Mesh& mesh) {
+  std::vector<SmoothedLayer> results(mesh.layers());
+  const auto view = [&](std::ptrdiff_t layer) -> LayerView {
+    const auto index = static_cast<std::size_t>(layer);
+    return {&mesh, index, mesh.positions.data() + mesh.layer_vertices[index]};
+  };
+  const SmoothedLayers layers = {view, results};
+  constexpr std::size_t kLayersPerTask = 4;
+  const auto measure = [&](std::size_t layer) {
+    const LayerView own = view(static_cast<std::ptrdiff_t>(layer));
+    for (std::size_t v = 0; v < own.vertices(); ++v) {
+      results[layer].after.add_vertex(load(own.positions[v]));
     }
-  }
+    layers.add_triangles(static_cast<std::ptrdiff_t>(layer), &SmoothedLayer::after);
+  };
+  for_each(context, results.size(), measure, kLayersPerTask);
+  FlatTriangles(layers).go_on(layers.count());
+  return layers.effect(mesh.positions.size()).after;
 }
 
 void FlatTriangles::go_on(std::ptrdiff_t moved) {

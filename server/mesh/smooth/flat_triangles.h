@@ -1,4 +1,4 @@
-// Triangles that smoothing leaves without area; private to the kernels.
+// Triangles without area, which joined crossings and smoothing make; private to the kernels.
 #pragma once
 
 #include <cstddef>
@@ -21,11 +21,15 @@ void put_back(const Vec3* extracted, std::ptrdiff_t layer, const SmoothedLayers&
 void measure_again(std::ptrdiff_t layer, bool SmoothedLayer::*was_moved,
                    const SmoothedLayers& layers);
 
-// Moves corners of triangles between the layer and the next that have no area still: beside
-// slivers, which samples that equal the iso-value have around them, one corner that is put back can
-// come to lie in line with two others that are not. Once for each layer, in their order, when those
-// up to the second next have been put back, and those up to the next measured again.
+// Moves corners of triangles between the layer and the next that have no area still. One corner
+// that is put back can come to lie in line with two others that are not, and so can the means of
+// joined crossings. Once for each layer, in their order, when those up to the second next have been
+// put back, and those up to the next measured again. Each move is about a rounding long: 2^-22 of
+// the largest coordinate beside it.
 void nudge_flat(std::ptrdiff_t layer, const SmoothedLayers& layers);
+
+// Nudges all layers of a mesh that is not being smoothed, and measures it. Throws Error kCancelled.
+Extent open_flat(const Context& context, Mesh& mesh);
 
 // Nudges as the layers come, after all their steps, and measures again.
 class FlatTriangles {

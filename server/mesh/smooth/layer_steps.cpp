@@ -227,9 +227,14 @@ class LayerSteps::Sweep {
     if (!round_.is_first()) return;
     LayerExtent& before = layers_.result(layer).before;
     for (std::size_t v = 0; v < count; ++v) before.add_vertex(to[v]);
-    if (run_.contains(layer - 1)) layers_.add_triangles(layer - 1, &SmoothedLayer::before);
-    const bool is_last = layer + 1 == layers_.count();
-    if (is_last && run_.contains(layer)) layers_.add_triangles(layer, &SmoothedLayer::before);
+    measure_before(layer - 1);
+    if (layer + 1 == layers_.count()) measure_before(layer);
+  }
+
+  void measure_before(std::ptrdiff_t layer) {
+    if (!run_.contains(layer)) return;
+    layers_.add_triangles(layer, &SmoothedLayer::before);
+    if (round_.options.steps.empty()) layers_.result(layer).after = layers_.result(layer).before;
   }
 
   void begin_links(std::ptrdiff_t layer) {

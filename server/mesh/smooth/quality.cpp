@@ -12,6 +12,7 @@
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
 #include "server/mesh/smooth/fan_moves.h"
+#include "server/mesh/smooth/flat_triangles.h"
 #include "server/mesh/smooth/layer_steps.h"
 #include "server/mesh/smooth/rings.h"
 
@@ -171,7 +172,7 @@ SmoothingEffect smooth_by_quality(const SmoothOptions& options, const Context& c
   effect.before = measure_extent(mesh, quiet);
   QualitySmoother smoother(options, context, mesh);
   smoother.run();
-  effect.after = measure_extent(mesh, quiet);
+  effect.after = open_flat(quiet, mesh);
   smoother.add_displacements(effect);
   return effect;
 }

@@ -217,8 +217,8 @@ std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& di
 
 SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh) {
   if (options.steps.empty() || mesh.positions.size() == 0) {
-    const Extent extent = measure_extent(mesh, context);
-    return {.before = extent, .after = extent};
+    const Extent before = measure_extent(mesh, context);
+    return {.before = before, .after = open_flat(context, mesh)};
   }
   return takes_means(options) ? Smoother(options, context, mesh).run()
                               : smooth_by_quality(options, context, mesh);

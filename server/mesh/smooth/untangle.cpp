@@ -13,6 +13,7 @@
 #include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/measure/surface_view.h"
 #include "server/mesh/parallel.h"
+#include "server/mesh/smooth/flat_triangles.h"
 #include "server/mesh/smooth/layer_steps.h"
 
 namespace isomesh::mesh {
@@ -59,6 +60,8 @@ class Untangler {
     effect.left = count_pairs(numbers_that([&](std::size_t t) { return bool{is_left_[t]}; }));
     effect.vertices = static_cast<std::uint64_t>(
         std::ranges::count_if(moves_, [](std::uint8_t moves) { return moves > 0; }));
+    // Corners that are all back may be in line, as they were extracted.
+    if (effect.vertices > 0) open_flat(quiet_, mesh_);
     add_displacements(effect);
     return effect;
   }

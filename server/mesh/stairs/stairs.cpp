@@ -9,6 +9,7 @@
 #include "server/mesh/labels/label_index.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
+#include "server/mesh/smooth/flat_triangles.h"
 #include "server/mesh/smooth/layer_steps.h"
 #include "server/mesh/stairs/missing_volume.h"
 #include "server/mesh/stairs/mobility.h"
@@ -193,7 +194,7 @@ SmoothingEffect remove_stairs(const Lattice<T>& lattice, const SeparateOptions& 
   report(0.9);
   const LayerDisplacement moved =
       take_over(shape, lattice.to_space, max_displacement_mm, quiet, surface.mesh);
-  effect.after = measure_extent(surface.mesh, quiet);
+  effect.after = open_flat(quiet, surface.mesh);
   effect.mean_displacement_mm = moved.sum / static_cast<double>(surface.mesh.positions.size());
   effect.max_displacement_mm = moved.largest;
   report(1);

@@ -55,7 +55,6 @@ class Walk {
         threads_(static_cast<std::size_t>(thread_count())),
         depth_(depth),
         has_normals_(options.normals),
-        is_smoothed_(!options.smooth.steps.empty()),
         count_((surface.layers() + depth - 1) / depth),
         slots_(std::min(count_, windows_at_once(options, depth))),
         results_(surface.layers()),
@@ -75,9 +74,7 @@ class Walk {
       work();
     });
     const Lock lock(mutex_);
-    SmoothingEffect effect = layers_.effect(surface_.count().vertices());
-    if (!is_smoothed_) effect.after = effect.before;
-    return {effect, seconds_};
+    return {layers_.effect(surface_.count().vertices()), seconds_};
   }
 
  private:
@@ -318,7 +315,6 @@ class Walk {
   const std::size_t threads_;
   const std::uint32_t depth_;
   const bool has_normals_;
-  const bool is_smoothed_;
   const std::size_t count_;  // of windows
   std::vector<Window> slots_;
   std::vector<SmoothedLayer> results_;

@@ -249,6 +249,13 @@ TEST(SmoothWallsShape, TwoLabelsAreSmoothedAsAnIsosurfaceIs) {
   }
 }
 
+// Where all corners of a triangle are on curves and in line, one is moved by about its rounding.
+bool is_where_it_was(const Vec3& after, const Vec3& before) {
+  constexpr float kLargest = 64;  // coordinate of these volumes
+  return std::ranges::equal(
+      after, before, [](float a, float b) { return std::abs(a - b) <= kLargest * 0x1p-22F; });
+}
+
 TEST(SmoothWalls, MeansLeaveJunctionCurvesWhereTheyAreIfAsked) {
   for (auto& [name, surface] : walls()) {
     SCOPED_TRACE(name);
@@ -258,7 +265,7 @@ TEST(SmoothWalls, MeansLeaveJunctionCurvesWhereTheyAreIfAsked) {
     std::size_t moved = 0;
     for (std::size_t v = 0; v < before.size(); ++v) {
       if (mesh.is_on_line(v)) {
-        ASSERT_EQ(mesh.positions[v], before[v]);
+        ASSERT_TRUE(is_where_it_was(mesh.positions[v], before[v]));
       }
       moved += mesh.positions[v] != before[v] ? 1 : 0;
     }
@@ -277,8 +284,11 @@ TEST(SmoothWalls, LargerAnglesLeaveJunctionCurvesWhereTheyAre) {
       const SmoothingEffect effect = smooth(options, {}, mesh);
       std::size_t moved = 0;
       for (std::size_t v = 0; v < before.size(); ++v) {
-        if (mesh.is_on_line(v) || mesh.is_on_border(v)) {
+        if (mesh.is_on_border(v)) {
           ASSERT_EQ(mesh.positions[v], before[v]);
+        }
+        if (mesh.is_on_line(v)) {
+          ASSERT_TRUE(is_where_it_was(mesh.positions[v], before[v]));
         }
         moved += mesh.positions[v] != before[v] ? 1 : 0;
       }

@@ -48,6 +48,47 @@ TEST_F(VerifyCommand, SaysWhereAMeshIsNot) {
   EXPECT_EQ(verified({"--bound", "0.1", "--close", "--crop=0,0,0,5,5,5"}).status, 1);
 }
 
+TEST_F(VerifyCommand, AsksForTheComponentsThatTheJobKept) {
+  MeshParameters parameters = parameters_within(0.1);
+  parameters.components.keep = 1;
+  write_file(mesh_, made(balls(), parameters));
+  const Finished without = verified({"--bound", "0.1"});
+  EXPECT_EQ(without.status, 1);
+  EXPECT_THAT(without.output, HasSubstr(", in the surface's component 3 of 3, of "));
+  EXPECT_EQ(verified({"--bound", "0.1", "--keep-components", "1"}).status, 0);
+  EXPECT_EQ(verified({"--bound", "0.1", "--keep-components", "2"}).status, 1);
+  EXPECT_EQ(verified({"--bound", "0.1", "--keep-nearest-to", "2,2,0.5"}).status, 0);
+  EXPECT_EQ(verified({"--bound", "0.1", "--keep-nearest-to=11,5,5"}).status, 1);
+  EXPECT_EQ(verified({"--bound", "0.1", "--min-component-triangles", "3"}).status, 1);
+  EXPECT_EQ(verified({"--bound", "0.1", "--keep-components", "0"}).status, 2);
+  EXPECT_EQ(verified({"--bound", "0.1", "--keep-nearest-to", "5,x,2"}).status, 2);
+}
+
+// GLB files carry the parameters of their job; options replace them.
+TEST_F(VerifyCommand, TakesTheParametersThatAFileCarries) {
+  MeshParameters parameters = parameters_within(0.1);
+  parameters.iso = 0.25;
+  parameters.formats = {MeshFormat::kGlb};
+  parameters.scheme = SchemeName::kFive;
+  parameters.components.keep = 1;
+  parameters.fill_cavities = true;
+  parameters.crop = Box{{{2.4, -5, 1.5}, {7.1, 100, 5}}};
+  parameters.close = true;
+  const std::string mesh = folder_ / "mesh.glb";
+  write_file(mesh, made(balls(), parameters));
+  const auto status_with = [&](const std::vector<std::string>& more) {
+    return run(with({ISOMESH_VERIFY, mesh, "--volume", volume_}, more)).status;
+  };
+  EXPECT_EQ(status_with({}), 0);
+  EXPECT_EQ(status_with({"--bound", "0.001"}), 1);
+  EXPECT_EQ(status_with({"--iso", "0.5"}), 1);
+  EXPECT_EQ(status_with({"--keep-components", "2"}), 0);  // filled and cropped, there is one
+  EXPECT_EQ(status_with({"--crop", "0,0,0,9,9,9"}), 1);
+  parameters.scheme = SchemeName::kBcc;
+  write_file(mesh, made(balls(), parameters));
+  EXPECT_EQ(status_with({}), 2);
+}
+
 TEST_F(VerifyCommand, EndsWithStatusTwoWhereItCannotTell) {
   const auto expect_refused = [&](const std::vector<std::string>& more, const char* text) {
     const Finished end = verified(more);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,6 +18,7 @@ using verify::Surface;
 using verify::Vec;
 using verify::operator+;
 using verify::operator*;
+using verify::operator-;
 
 constexpr double kBound = 0.05;
 constexpr std::array<double, 4> kPlaces = {0.1, 0.37, 0.62, 0.93};  // of the triangles
@@ -137,21 +139,71 @@ TEST_F(VerifyFaults, OfAComponentThatIsTooMuch) {
       "triangles have points farther than 0.05 mm");
 }
 
-// All components of the surface are wanted, unless a job may leave some out.
+// A mesh of only the component that has the most triangles, and of any other.
 TEST_F(VerifyFaults, OfComponentsAreNoneIfTheJobLeavesThemOut) {
-  Surface mesh = right_;
-  const auto components = verify::components_of(mesh);
-  const std::uint32_t first = components[mesh.triangles[0][0]];
-  std::erase_if(mesh.triangles,
-                [&](const verify::Indices& t) { return components[t[0]] != first; });
-  EXPECT_FALSE(verdict(mesh, volume_, parameters_).holds);
   MeshParameters parameters = parameters_;
   parameters.components.keep = 1;
-  const verify::Verdict said = verdict(mesh, volume_, parameters);
-  EXPECT_TRUE(said.holds) << said.text;
-  EXPECT_THAT(said.text, HasSubstr("in 3 components, of which the mesh comes near to 1."));
-  mesh.triangles.pop_back();
-  EXPECT_FALSE(verdict(mesh, volume_, parameters).holds);
+  Surface largest = surface_;
+  verify::keep_components(parameters.components, largest);
+  const verify::Tree kept(largest);
+  const auto components = verify::components_of(right_);
+  std::set<std::uint32_t> of_mesh;
+  for (const verify::Indices& t : right_.triangles) of_mesh.insert(components[t[0]]);
+  ASSERT_EQ(of_mesh.size(), 3U);
+  std::size_t right = 0;
+  for (const std::uint32_t one : of_mesh) {
+    Surface mesh = right_;
+    std::erase_if(mesh.triangles,
+                  [&](const verify::Indices& t) { return components[t[0]] != one; });
+    EXPECT_FALSE(verdict(mesh, volume_, parameters_).holds);
+    const bool is_largest =
+        kept.nearest(mesh.points[mesh.triangles[0][0]], 0).squared <= kBound * kBound;
+    const verify::Verdict said = verdict(mesh, volume_, parameters);
+    EXPECT_EQ(said.holds, is_largest) << said.text;
+    EXPECT_THAT(said.text, HasSubstr("in 3 components, of which the job keeps 1, of "));
+    if (!is_largest) continue;
+    ++right;
+    mesh.triangles.pop_back();
+    EXPECT_FALSE(verdict(mesh, volume_, parameters).holds);
+  }
+  EXPECT_EQ(right, 1U);
+}
+
+// The mesh is nearer to the rod than to the ball in places, but the job kept only the ball.
+TEST(VerifyComponents, BesideTheOneThatIsKeptAreNotAskedFor) {
+  const Vec centre = {10, 10, 8};
+  auto volume = sample<float>(sphere({10, 10, 8}, 6), {21, 21, 25}, Geometry{});
+  for (std::uint32_t k = 16; k < 23; ++k) volume.at(10, 10, k) = 1;
+  MeshParameters parameters = parameters_within(1.5);
+  Surface mesh = verify::zero_set(field_of(volume), {});
+  parameters.components.keep = 1;
+  verify::keep_components(parameters.components, mesh);
+  for (Vec& point : mesh.points) point = centre + 1.2 * (point - centre);
+  EXPECT_TRUE(verdict(mesh, volume, parameters).holds) << verdict(mesh, volume, parameters).text;
+  parameters.components.keep = 2;
+  const verify::Verdict said = verdict(mesh, volume, parameters);
+  EXPECT_FALSE(said.holds);
+  EXPECT_THAT(said.text, HasSubstr(", in the surface's component 2 of 2, of "));
+}
+
+// Far points say where they belong to: of three balls' surfaces the smallest is missing.
+TEST_F(VerifyFaults, AreToldWithTheirComponent) {
+  Surface mesh = right_;
+  ComponentFilter filter;
+  filter.keep = 2;
+  verify::keep_components(filter, mesh);
+  EXPECT_THAT(verdict(mesh, volume_, parameters_).text,
+              testing::ContainsRegex("mm at \\(.*\\), in the surface's component 3 of 3, of [0-9]+ "
+                                     "triangles"));
+  mesh = right_;
+  const auto components = verify::components_of(mesh);
+  for (std::size_t n = 0; n < mesh.points.size(); ++n) {
+    if (components[n] == components[mesh.triangles[0][0]]) mesh.points[n][0] -= 3 * kBound;
+  }
+  EXPECT_THAT(
+      verdict(mesh, volume_, parameters_).text,
+      testing::ContainsRegex("mm at \\(.*\\), in the mesh's component [123] of 3, of [0-9]+ "
+                             "triangles"));
 }
 
 TEST_F(VerifyFaults, OfAWholeSurfaceThatIsMoved) {

@@ -17,7 +17,7 @@ std::string bytes_of(const verify::Vec& p) {
 
 }  // namespace
 
-std::string made(const SampleVolume<float>& volume, const MeshParameters& parameters) {
+Made made_with_word(const SampleVolume<float>& volume, const MeshParameters& parameters) {
   Volume record;
   record.dims = {volume.dims.x, volume.dims.y, volume.dims.z};
   record.type = SampleType::kFloat32;
@@ -34,8 +34,13 @@ std::string made(const SampleVolume<float>& volume, const MeshParameters& parame
   const jobs::Report unheard = [](Stage, double, const Timing&) {};
   jobs::Progress progress({}, unheard, {});
   mesh::Mesh mesh;
-  jobs::make_mesh(cropped.array(), request, std::span(&sink, 1), progress, mesh);
-  return file;
+  const MeshSummary summary =
+      jobs::make_mesh(cropped.array(), request, std::span(&sink, 1), progress, mesh);
+  return {file, summary.certificate && summary.certificate->bound_mm};
+}
+
+std::string made(const SampleVolume<float>& volume, const MeshParameters& parameters) {
+  return made_with_word(volume, parameters).file;
 }
 
 MeshParameters parameters_within(double bound) {
@@ -67,11 +72,12 @@ verify::Verdict verdict(verify::Surface mesh, const SampleVolume<float>& volume,
   cut.tetrahedra = parameters.scheme == SchemeName::kFive ? 5 : 6;
   cut.close = parameters.close;
   cut.midpoint = parameters.interpolation == Interpolation::kMidpoint;
+  if (parameters.fill_cavities) verify::fill_cavities(cut, field);
   verify::Surface surface = verify::zero_set(field, cut);
   verify::Question question;
   question.bound = parameters.max_error_mm.value_or(0.001);
   question.is_closed = cut.close;
-  question.some_parts = parameters.fill_cavities || parameters.components.keep.has_value();
+  question.components = parameters.components;
   return verify::verify(mesh, surface, field, question);
 }
 

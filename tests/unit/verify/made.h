@@ -9,7 +9,14 @@
 
 namespace isomesh::test {
 
-// A job's only file. Vertices are not moved before they are simplified, unless `parameters` say so.
+struct Made {
+  std::string file;
+  bool is_proven = false;  // the job says that the distance holds
+};
+
+// A job's only file, and its word on it. Vertices are not moved before they are simplified, unless
+// `parameters` say so.
+Made made_with_word(const SampleVolume<float>& volume, const MeshParameters& parameters);
 std::string made(const SampleVolume<float>& volume, const MeshParameters& parameters);
 
 // An iso-value of 0, STL, max_error_mm.
