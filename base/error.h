@@ -28,6 +28,7 @@ enum class ErrorCode {
   kUnsupportedMedia,     // 415: not a supported volume format or content encoding
   kRangeNotSatisfiable,  // 416
   kUnusableVolume,       // 422: a volume that is corrupt or ambiguous
+  kEmptySurface,         // 422: the mesh has no triangles, and the request does not accept that
   kKeyReused,            // 422: an idempotency key that was used with another body
   kTooManyRequests,      // 429
   kInternal,             // 500: a bug; clients never see the detail

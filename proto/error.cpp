@@ -28,6 +28,7 @@ constexpr std::array kDescriptions = {
                      "Range not satisfiable"},
     ErrorDescription{ErrorCode::kUnusableVolume, 422, "unusable-volume",
                      "The volume cannot be used"},
+    ErrorDescription{ErrorCode::kEmptySurface, 422, "empty-surface", "The surface is empty"},
     ErrorDescription{ErrorCode::kKeyReused, 422, "key-reused",
                      "The idempotency key was used for another request"},
     ErrorDescription{ErrorCode::kTooManyRequests, 429, "too-many-requests", "Too many requests"},

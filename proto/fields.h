@@ -288,6 +288,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
     field("iso", self.iso);
   }
   field("empty", self.empty);
+  if (is_told(self, self.empty_reason.has_value())) {
+    field("empty_reason", self.empty_reason);
+  }
   field("triangles", self.triangles);
   field("vertices", self.vertices);
   field("boundary_edges", self.boundary_edges);

@@ -302,6 +302,7 @@ struct MeshSummary {
 
   std::optional<double> iso = {};  // the value used; none by labels
   bool empty = false;
+  std::optional<std::string> empty_reason = {};  // if it is empty; see proto/empty_surface.h
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t boundary_edges = 0;

@@ -79,21 +79,11 @@ int status(Client& client, const Options& options) {
   return kDone;
 }
 
-// The range of the samples of an empty mesh's volume, which may have been deleted meanwhile.
-std::optional<SampleRange> range_of(Client& client, const Job& job) {
-  if (!job.mesh || !job.mesh->empty) return std::nullopt;
-  try {
-    return client.volume(job.parameters.volume).range;
-  } catch (const Error&) {
-    return std::nullopt;
-  }
-}
-
 int wait(Client& client, const Options& options) {
   ProgressBar bar(!options.quiet);
   const Job job = wait(client, job_id(client, options.id), bar);
   if (!options.quiet || options.json) show(client, job, options.json);
-  return status_of(job, options, {}, range_of(client, job));
+  return status_of(job, options);
 }
 
 int fetch(Client& client, const Options& options) {
@@ -103,7 +93,7 @@ int fetch(Client& client, const Options& options) {
   const Job job = client.job(id);
   if (job.state == JobState::kSucceeded && !has_mesh(job, options)) {
     if (options.json) print_json(job_json(job, {}, {}));
-    return status_of(job, options, {}, range_of(client, job));
+    return status_of(job, options);
   }
   const auto start = std::chrono::steady_clock::now();
   for (const Output& output : outputs) fetch(client, id, output, bar, options.label);

@@ -2,7 +2,7 @@
 
 #include "client/cli/console.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/text.h"
+#include "proto/empty_surface.h"
 
 namespace isomesh::cli {
 namespace {
@@ -10,20 +10,6 @@ namespace {
 Error reason_of(const Job& job) {
   if (job.error) return to_error(*job.error);
   return {ErrorCode::kCancelled, "the job was cancelled"};
-}
-
-std::string why_empty(const Job& job, const std::optional<SampleRange>& range) {
-  const MeshSummary& mesh = *job.mesh;
-  if (mesh.dropped.components > 0) return "all of its components were dropped";
-  const std::string nothing =
-      job.parameters.crop ? " no surface in the box of --crop" : " no surface";
-  if (!mesh.iso) return "the labels have" + nothing;
-  std::string reason = "the volume has" + nothing + " at the iso-value " + human_number(*mesh.iso);
-  if (range && !job.parameters.crop) {
-    reason += "; its samples range from " + human_number((*range)[0]) + " to " +
-              human_number((*range)[1]);
-  }
-  return reason;
 }
 
 }  // namespace
@@ -36,15 +22,13 @@ bool has_mesh(const Job& job, const Options& options) {
   return job.state == JobState::kSucceeded && job.mesh && (!job.mesh->empty || options.allow_empty);
 }
 
-int status_of(const Job& job, const Options& options, const std::string& subject,
-              const std::optional<SampleRange>& range) {
+int status_of(const Job& job, const Options& options, const std::string& subject) {
   if (job.state == JobState::kFailed || job.state == JobState::kCancelled) {
     complain(reason_of(job), subject);
     return kRefused;
   }
   if (!job.mesh || !job.mesh->empty || options.allow_empty) return kDone;
-  complain((subject.empty() ? "" : subject + ": ") +
-           "the surface is empty: " + why_empty(job, range) + "; --allow-empty accepts that");
+  complain(empty_surface(*job.mesh, "--allow-empty accepts that"), subject);
   return kRefused;
 }
 

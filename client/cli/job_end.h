@@ -1,8 +1,6 @@
 // The end of a job, as the command reports it; private to this folder.
 #pragma once
 
-#include <array>
-#include <optional>
 #include <string>
 
 #include "client/cli/options.h"
@@ -24,12 +22,9 @@ int status_of(const Error& error);
 // accepted.
 bool has_mesh(const Job& job, const Options& options);
 
-using SampleRange = std::array<double, 2>;
-
-// The exit status for the end of a job. The reason of a failure, or an empty surface, is reported
-// on standard error, with the range of the volume's samples if it is known.
-int status_of(const Job& job, const Options& options, const std::string& subject = {},
-              const std::optional<SampleRange>& range = {});
+// The exit status for the end of a job. The reason of a failure, or of an empty surface, is
+// reported on standard error.
+int status_of(const Job& job, const Options& options, const std::string& subject = {});
 
 // Without a terminal no progress is shown, so the client uses the longest polls.
 Job wait(Client& client, const std::string& id, ProgressBar& bar);

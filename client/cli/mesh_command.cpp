@@ -235,7 +235,7 @@ int MeshRun::mesh(const Volume& volume, const Task& task) {
   if (!job) return kRefused;
   if (!has_mesh(*job, options_)) {
     if (options_.json) print_json(job_json(*job, {}, seen_, task.origin));
-    return status_of(*job, options_, task.subject, volume.range);
+    return status_of(*job, options_, task.subject);
   }
   const auto downloading = std::chrono::steady_clock::now();
   resumable(job->id, [&] {

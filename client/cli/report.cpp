@@ -242,6 +242,7 @@ std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
   const Units in(unit);
   Rows rows;
   tell_iso(mesh, rows);
+  if (mesh.empty) rows.push_back({"surface", "empty: " + mesh.empty_reason.value_or("unknown")});
   const Rows sizes = {
       {"triangles", grouped(mesh.triangles)},
       {"vertices", grouped(mesh.vertices)},

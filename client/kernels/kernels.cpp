@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "base/mutex.h"
+#include "proto/empty_surface.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/types.h"
@@ -241,7 +242,16 @@ class Run {
     job.parameters = std::move(parameters);
     job.timing = progress.timing();
     job.mesh = std::move(made.summary);
+    if (job.mesh->empty) {
+      job.mesh->empty_reason = why_empty(job.parameters, *job.mesh, values_of(samples, volume));
+    }
     job_ = to_full_json(job);
+  }
+
+  SampleValues values_of(const jobs::SampleArray& samples, const Volume& volume) const {
+    const auto statistics =
+        volume::measure({samples.bytes, volume.bytes}, volume.type, given_.left_out);
+    return {statistics.range, statistics.otsu};
   }
 
   Volume volume_of() const {

@@ -12,6 +12,7 @@
 #include "client/cli/console.h"
 #include "client/cli/run_folder.h"
 #include "client/mcp/schema.h"
+#include "proto/empty_surface.h"
 #include "proto/json.h"
 #include "proto/types.h"
 
@@ -237,6 +238,12 @@ Job made(const JobParameters& parameters, const ToolCall& call) {
   }
 }
 
+void check_surface(const Job& job, const McpJson& arguments) {
+  if (!job.mesh || !job.mesh->empty) return;
+  if (argument<bool>(arguments, "allow_empty").value_or(false)) return;
+  throw empty_surface(*job.mesh, "allow_empty accepts that");
+}
+
 void write(const std::string& job, const std::vector<OutputFile>& outputs,
            std::optional<std::int64_t> label, const ToolCall& call) {
   for (const OutputFile& output : outputs) {
@@ -270,17 +277,19 @@ McpJson mesh(const McpJson& arguments, const ToolCall& call) {
   const std::string volume = text_of(arguments, "volume");
   parameters.volume = volume.empty() ? uploaded(arguments, call).id : volume;
   const Job job = made(parameters, call);
+  check_surface(job, arguments);
   write(job.id, outputs, std::nullopt, call);
   return McpJson::parse(to_json(job));
 }
 
 McpJson fetch(const McpJson& arguments, const ToolCall& call) {
   const auto label = argument<std::int64_t>(arguments, "label");
-  const std::string job = text_of(arguments, "job");
-  const bool is_by_labels = !label && call.client.job(job).parameters.labels;
+  const Job job = call.client.job(text_of(arguments, "job"));
+  const bool is_by_labels = !label && job.parameters.labels;
   const std::vector<OutputFile> outputs = outputs_of(arguments, call.folder, is_by_labels);
   if (outputs.empty()) throw invalid_parameter("output", "must name a file");
-  write(job, outputs, label, call);
+  check_surface(job, arguments);
+  write(job.id, outputs, label, call);
   McpJson files = McpJson::array();
   for (const OutputFile& output : outputs) {
     files.push_back({{"file", output.path.lexically_relative(call.folder).string()},
@@ -301,6 +310,8 @@ std::vector<Tool> make_tools() {
   of_mesh["parameters"]["description"] =
       "Give `iso` for a scan, or `labels` (\"all\" or a list of numbers) for a segmentation";
   of_mesh["output"] = output;
+  const McpJson allow_empty = flag_schema("An empty surface is no error");
+  of_mesh["allow_empty"] = allow_empty;
   return {
       {"upload",
        "Stores a medical volume (DICOM, NIfTI, NRRD, ...) on the isomesh server and describes it. "
@@ -343,7 +354,10 @@ std::vector<Tool> make_tools() {
       {"fetch",
        "Writes the mesh of a finished job to files, or the surface of one of its labels.",
        false,
-       {{"job", job}, {"output", output}, {"label", number_schema("One label's own surface")}},
+       {{"job", job},
+        {"output", output},
+        {"label", number_schema("One label's own surface")},
+        {"allow_empty", allow_empty}},
        {"job", "output"},
        fetch}};
 }

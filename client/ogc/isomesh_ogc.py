@@ -237,6 +237,8 @@ class Handler(BaseHTTPRequestHandler):
         status.update({name: job[name] for name in ("created", "started", "finished") if job.get(name)})
         if job.get("error"):
             status["message"] = job["error"].get("detail") or job["error"]["title"]
+        if job.get("mesh") and job["mesh"]["empty"]:
+            status["message"] = f"The surface is empty: {job['mesh'].get('empty_reason', 'the file has no triangles')}"
         if job["state"] == "succeeded":
             status["links"].append(self._link(f"{path}/results", "http://www.opengis.net/def/rel/ogc/1.0/results"))
         return status

@@ -35,6 +35,7 @@ PROPERTIES = (
     ("String", "Labels", "", "", "Empty for a surface at the iso-value; all, or numbers with blanks between, for surfaces of labels."),
     ("Double", "LargestError", 0, '<DoubleRangeDomain name="range" min="0"/>', "In mm. The surface is simplified within it. 0: no simplification."),
     ("Int", "Distances", 0, '<BooleanDomain name="bool"/>', "Adds distance_mm: how far smoothing and simplification moved each vertex."),
+    ("Int", "AllowEmpty", 0, '<BooleanDomain name="bool"/>', "Gives no surface if it is empty, instead of an error."),
     ("String", "Server", SERVER, "", "The address of the daemon."),
 )
 
@@ -52,6 +53,7 @@ class Surface(VTKPythonAlgorithmBase):
     def __init__(self, inputs):
         super().__init__(nInputPorts=inputs, inputType="vtkImageData", nOutputPorts=1, outputType="vtkPolyData")
         self._server, self._iso, self._labels, self._error, self._distances = SERVER, "otsu", "", 0.0, False
+        self._allow_empty = False
         self._stored = (None, None)
 
     def _set(self, name, value):
@@ -73,6 +75,9 @@ class Surface(VTKPythonAlgorithmBase):
 
     def SetDistances(self, value):
         self._set("_distances", bool(value))
+
+    def SetAllowEmpty(self, value):
+        self._set("_allow_empty", bool(value))
 
     def parameters(self):
         if self._labels:
@@ -107,20 +112,21 @@ class Surface(VTKPythonAlgorithmBase):
         parameters = self.parameters()
         if self._stored[0] == key:
             try:
-                return self.fetched(client, client.mesh(self._stored[1], progress=self.seen, **parameters))
+                return self.fetched(client, parameters)
             except isomesh_client.Refused as refused:
                 if refused.status != 404:
                     raise
                 # The daemon has removed the volume meanwhile.
         self._stored = (key, upload(client))
-        return self.fetched(client, client.mesh(self._stored[1], progress=self.seen, **parameters))
+        return self.fetched(client, parameters)
 
     def seen(self, job):
         self.UpdateProgress(job["progress"])
         if self.GetAbortExecute():
             raise ValueError("the surface was cancelled")
 
-    def fetched(self, client, mesh):
+    def fetched(self, client, parameters):
+        mesh = client.mesh(self._stored[1], progress=self.seen, allow_empty=self._allow_empty, **parameters)
         surface = mesh.to_vtk()
         if self._distances and len(mesh.vertices):
             with tempfile.TemporaryDirectory() as folder:

@@ -87,8 +87,9 @@ class IsomeshLogic(ScriptedLoadableModuleLogic):
             reason = getattr(error, "reason", error)
             raise RuntimeError(f"isomesh: {self.server} cannot be reached: {reason}") from None
 
-    def mesh(self, node, iso="otsu", max_error_mm=None, progress=lambda value, stage: None):
-        """Loads the surfaces of a volume at `iso`, or of each segment of a segmentation, as models. Returns their nodes."""
+    def mesh(self, node, iso="otsu", max_error_mm=None, progress=lambda value, stage: None, allow_empty=False):
+        """Loads the surfaces of a volume at `iso`, or of each segment of a segmentation, as models. Returns their nodes: none if
+        the surface is empty and `allow_empty` is true. Otherwise that is a RuntimeError."""
         is_segmentation = node.IsA("vtkMRMLSegmentationNode")
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "volume.seg.nrrd" if is_segmentation else "volume.nrrd")
@@ -98,6 +99,8 @@ class IsomeshLogic(ScriptedLoadableModuleLogic):
             if max_error_mm is not None:
                 parameters["max_error_mm"] = max_error_mm
             job = self.job_of(self.upload(path), parameters, progress)
+            if job["mesh"]["empty"] and not allow_empty:
+                raise RuntimeError(f"isomesh: the surface is empty: {job['mesh'].get('empty_reason', '')}")
             surfaces = job["mesh"].get("labels") or [{"label": None, "name": node.GetName(), "color": None}]
             if job["mesh"].get("labels_count"):
                 raise RuntimeError("isomesh: there are more than 256 segments. Mesh fewer of them")

@@ -12,7 +12,7 @@ const samplesOf = {
 };
 const slicesAtOnce = 8;
 
-const { ApiError, Client, choicesOf } = await import(/* @vite-ignore */ `${server}/client.js`);
+const { ApiError, Client, choicesOf, emptyReason } = await import(/* @vite-ignore */ `${server}/client.js`);
 const client = new Client({ server });
 
 export async function upload(file) {
@@ -52,6 +52,7 @@ export async function meshOfLabels(volume, maxErrorMm) {
   if (maxErrorMm > 0) request.max_error_mm = maxErrorMm;
   const job = await client.follow((await client.submitJob(request)).id);
   if (job.state !== 'succeeded') throw new Error(job.error?.detail ?? `The job is ${job.state}.`);
+  if (job.mesh.empty) throw new Error(emptyReason(job.mesh));
   return job;
 }
 

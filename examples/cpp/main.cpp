@@ -40,6 +40,11 @@ int main(int argc, char** argv) {
     const isomesh::Job job = client.wait(client.submit(parameters).id, [](const isomesh::Job& now) {
       std::printf("%3.0f %%\n", 100 * now.progress);
     });
+    if (job.mesh && job.mesh->empty) {
+      std::fprintf(stderr, "the surface is empty: %s\n",
+                   job.mesh->empty_reason.value_or("").c_str());
+      return 1;
+    }
     client.fetch(job.id, isomesh::MeshFormat::kGlb, argv[3]);
     std::printf("%s: %llu triangles, %.0f mm2\n", argv[3],
                 static_cast<unsigned long long>(job.mesh->triangles), job.mesh->area_mm2);

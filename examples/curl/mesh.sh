@@ -52,6 +52,10 @@ if [[ "$state" != succeeded ]]; then
   echo "mesh.sh: job $job: $state: $(member detail "$answer")" >&2
   exit 1
 fi
+if [[ "$answer" == *'"empty":true'* ]]; then
+  echo "mesh.sh: job $job: the surface is empty: $(member empty_reason "$answer")" >&2
+  exit 1
+fi
 # An earlier mesh stays until the new one is here as a whole.
 part="$output.part"
 trap 'rm -f -- "$part"' EXIT

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/json.h"
+#include "proto/parameters.h"
 #include "tests/api/daemon.h"
 #include "tests/api/digest.h"
 #include "tests/api/problems.h"
@@ -15,7 +16,10 @@ namespace isomesh {
 namespace {
 
 using namespace test;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
 
 class MeshTest : public testing::Test {
  protected:
@@ -257,6 +261,75 @@ TEST_F(MeshInOne, RefusesWhatIsNoVolume) {
   EXPECT_TRUE(is_problem(post("iso=1", "garbage"), ErrorCode::kUnsupportedMedia));
   EXPECT_TRUE(is_problem(post("iso=1", ""), ErrorCode::kInvalidParameter));
   EXPECT_TRUE(daemon_.client().jobs().jobs.empty());
+}
+
+// --- Without a surface
+// ----------------------------------------------------------------------------------
+
+constexpr std::size_t kEmptyStlBytes = 84;
+
+RawUpload all_of(std::uint8_t value) {
+  return raw_upload(
+      sample<std::uint8_t>([value](const Point& /*point*/) -> double { return value; }, {4, 4, 4}));
+}
+
+TEST_F(MeshInOne, AnEmptySurfaceIsAnErrorUnlessItIsAccepted) {
+  const double iso =
+      volume_from_json(daemon_.send("POST", "/v1/volumes?" + sphere_.query, sphere_.bytes).body)
+          .suggested_iso;
+  const std::string suggests = "its suggested iso-value is " + number_text(iso);
+  struct Way {
+    RawUpload raw;
+    std::string query;
+    std::string reason;
+  };
+  for (const Way& way :
+       {Way{sphere_, "iso=1000", suggests}, Way{sphere_, "iso=1000&close=true", suggests},
+        Way{sphere_, "iso=-5", "separates none of the samples of the volume, which range from "},
+        Way{sphere_, "iso=100&crop=0,0,0,2,2,2", "in the box of crop; those of the volume range"},
+        Way{sphere_, "iso=100&min_triangles=1000000", "its only connected component was dropped"},
+        Way{all_of(7), "iso=otsu", "which range from 7 to 7; allow_empty"},
+        Way{all_of(1), "labels=all", "the chosen labels have no boundary; close adds"}}) {
+    SCOPED_TRACE(way.query);
+    const std::string query = way.raw.query + "&format=stl&" + way.query;
+    const Answer refused = post(query, way.raw.bytes);
+    ASSERT_TRUE(is_problem(refused, ErrorCode::kEmptySurface));
+    const std::string detail = problem_from_json(refused.body).detail;
+    EXPECT_THAT(detail, StartsWith("the surface is empty: "));
+    EXPECT_THAT(detail, HasSubstr(way.reason));
+    EXPECT_THAT(detail, EndsWith("; allow_empty=true accepts that"));
+    const std::string job = refused.header("location");
+    const Job made = job_from_json(daemon_.get(job).body);
+    EXPECT_EQ(made.state, JobState::kSucceeded);
+    EXPECT_TRUE(made.mesh->empty);
+    EXPECT_THAT(detail, HasSubstr(made.mesh->empty_reason.value()));
+    EXPECT_EQ(daemon_.get(job + "/mesh.stl").body.size(), kEmptyStlBytes);
+    const Answer accepted = post(query + "&allow_empty=true", way.raw.bytes);
+    EXPECT_EQ(accepted.status, 200) << accepted.body;
+    EXPECT_EQ(accepted.body.size(), kEmptyStlBytes);
+  }
+}
+
+TEST_F(MeshInOne, ASurfaceThatIsThereHasNoReason) {
+  for (const std::string query : {"iso=100", "iso=100&allow_empty=true", "iso=-5&close=true"}) {
+    const Answer answer = post(query);
+    ASSERT_EQ(answer.status, 200) << query << answer.body;
+    const std::string job = daemon_.get(answer.header("location")).body;
+    EXPECT_THAT(job, Not(HasSubstr("empty_reason"))) << query;
+  }
+  EXPECT_TRUE(blames(post("iso=100&allow_empty=yes"), "allow_empty"));
+  EXPECT_TRUE(blames(post("iso=100&allow_empty=true&allow_empty=true"), "allow_empty"));
+}
+
+// Its first response may be followed by the mesh, without another upload's job.
+TEST_F(MeshInOne, AKeyMayComeAgainWithWhatItAllows) {
+  const Headers key = {{"Idempotency-Key", "k"}};
+  const std::string target = "/v1/mesh?iso=1000&format=stl&" + sphere_.query;
+  const Answer refused = daemon_.send("POST", target, sphere_.bytes, key);
+  ASSERT_TRUE(is_problem(refused, ErrorCode::kEmptySurface));
+  const Answer accepted = daemon_.send("POST", target + "&allow_empty=true", sphere_.bytes, key);
+  EXPECT_EQ(accepted.status, 200);
+  EXPECT_EQ(accepted.header("location"), refused.header("location"));
 }
 
 }  // namespace

@@ -35,6 +35,7 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
+using testing::StartsWith;
 
 const std::string kSamples = "abcdefghijklmnopqrstuvwx";  // 4 x 3 x 2
 
@@ -304,6 +305,31 @@ TEST_F(NotesTest, OfAMeshAreShownWithIt) {
   const Finished closed = mesh("5");
   ASSERT_EQ(closed.status, 0) << closed.errors;
   EXPECT_THAT(closed.output, Not(HasSubstr("thin-walls")));
+}
+
+// The codes are in a header of one length at most, and the volume has their texts.
+TEST_F(NotesTest, AreToldWithTheMeshOfOneRequest) {
+  const std::string file = nifti({.qform_code = 1, .qoffset = {3, 0, 0}}, kSamples);
+  for (const std::string query : {"iso=110", "iso=1000", "iso=1000&allow_empty=true"}) {
+    SCOPED_TRACE(query);
+    const Answer answer = daemon_.send("POST", "/v1/mesh?format=stl&" + query, file);
+    EXPECT_THAT(answer.header("isomesh-notes"), HasSubstr("forms-differ"));
+    const std::string link = answer.header("link");
+    ASSERT_THAT(link, AllOf(StartsWith("</v1/volumes/"), EndsWith(">; rel=\"describedby\"")));
+    const Answer volume = daemon_.get(link.substr(1, link.find('>') - 1));
+    std::string codes;
+    for (const Note& note : volume_from_json(volume.body).notes) {
+      codes += (codes.empty() ? "" : ", ") + note.code;
+    }
+    EXPECT_EQ(answer.header("isomesh-notes"), codes);
+  }
+  const RawUpload sphere = sphere_upload();
+  const Answer plain = daemon_.send("POST", "/v1/mesh?iso=100&" + sphere.query, sphere.bytes);
+  EXPECT_EQ(plain.headers.count("isomesh-notes"), 0U);
+  EXPECT_EQ(plain.headers.count("link"), 1U);
+  std::size_t longest = 0;
+  for (const NoteDescription& note : note_descriptions()) longest += note.name.size() + 2;
+  EXPECT_LT(longest, 2048U);
 }
 
 TEST_F(NotesTest, ARefusalOffersTheVolumesOfAFile) {

@@ -56,6 +56,8 @@ for volume in list(isomesh_client.Client(SERVER).volumes()):
 reader.Distances = 0
 result["uploaded again"] = told(reader)
 result["all uploads"] = len(uploads)
+result["empty"] = told(isomeshReader(FileName=VOLUME, Server=SERVER, IsoValue="5"))  # noqa: F821
+result["allowed"] = told(isomeshReader(FileName=VOLUME, Server=SERVER, IsoValue="5", AllowEmpty=1))  # noqa: F821
 result["labels"] = told(isomeshReader(FileName=LABELS, Server=SERVER, Labels="all", Distances=1))  # noqa: F821
 result["one label"] = told(isomeshReader(FileName=LABELS, Server=SERVER, Labels="2"))  # noqa: F821
 result["no server"] = told(isomeshReader(FileName=VOLUME, Server="http://127.0.0.1:9", IsoValue="-9"))  # noqa: F821

@@ -168,12 +168,13 @@ class Arrays(DaemonTest):
         samples[1:3, 1:3, 1:3] = 4294967295
         self.assertEqual(set(self.client.mesh(samples, labels="all").labels.tolist()), {4294967295})
 
-    def test_an_empty_surface_is_an_empty_mesh(self):
-        range_of = r"the iso-value 5 is outside the samples' range, -\d+\.?\d* to -0\.8"
-        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "the surface is empty: " + range_of):
-            mesh = self.client.mesh(ball(), iso=5)
-        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "the surface is empty: no connected component was kept"):
+    def test_an_empty_surface_that_is_allowed_is_an_empty_mesh(self):
+        range_of = r"the iso-value 5 separates none of the samples of the volume, which range from -\d+\.?\d* to -0\.8"
+        with self.assertRaisesRegex(isomesh_client.EmptySurface, "the surface is empty: " + range_of):
+            self.client.mesh(ball(), iso=5)
+        with self.assertRaisesRegex(isomesh_client.EmptySurface, "its only connected component was dropped"):
             self.client.mesh(ball(), iso=-8, components={"min_triangles": 10**8})
+        mesh = self.client.mesh(ball(), iso=5, allow_empty=True)
         self.assertEqual(mesh.vertices.shape, (0, 3))
         self.assertEqual(mesh.in_space("ras").faces.shape, (0, 3))
 
@@ -186,7 +187,7 @@ sys.modules["numpy"] = None
 import isomesh_client, json
 mesh = isomesh_client.read_ply(sys.argv[1])
 ras = mesh.in_space("ras")
-empty = isomesh_client.Client(sys.argv[2]).mesh(sys.argv[3], iso=1000)
+empty = isomesh_client.Client(sys.argv[2]).mesh(sys.argv[3], iso=1000, allow_empty=True)
 bounds = [mesh.bounds.tolist(), empty.bounds.tolist()]
 mesh.save(sys.argv[4])
 try:

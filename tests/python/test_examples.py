@@ -1,10 +1,12 @@
-"""The example for curl against a server that fails. tests/install/run tries it with a daemon."""
+"""The example for curl and the shown lines against a server that fails. tests/install/run tries the example with a daemon."""
 
 import os
+import re
 import subprocess
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 from limits import LimitedTest
 from support import ROOT, FakeServer
@@ -64,6 +66,55 @@ class Curl(LimitedTest):
         self.assert_kept(ran)
         self.assertIn("status 503", ran.stderr)
         self.assertNotIn("\x1b", ran.stderr)
+
+    def test_an_empty_surface_keeps_the_earlier_mesh(self):
+        job = b'{"state":"succeeded","mesh":{"empty":true,"empty_reason":"the labels have none","triangles":0}}'
+        with mock.patch.dict(ANSWERS, {"/v1/jobs/j": job}):
+            ran = self.run_against()
+        self.assert_kept(ran)
+        self.assertIn("the surface is empty: the labels have none", ran.stderr)
+
+
+class CurlLines(LimitedTest):
+    """The lines of README and docs that save a mesh, or anything else, as they stand there."""
+
+    def lines(self):
+        for document in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+            text = document.read_text()
+            for line in re.findall(r"(?m)^    (curl (?:.*\\\n)*.*)$", text):
+                if re.search(r" (-o|-O|--output)\b", line):
+                    yield document.name, line
+
+    def run_line(self, line, respond):
+        with tempfile.TemporaryDirectory() as work, FakeServer(respond) as server:
+            folder = Path(work)
+            (folder / "head.nii.gz").write_bytes(b"volume")
+            ran = subprocess.run(
+                ["bash", "-c", line.replace("http://127.0.0.1:8080", server.url)],
+                cwd=folder, check=False, capture_output=True, text=True, timeout=60,
+            )
+            return ran, {each.name: each.read_bytes() for each in folder.iterdir() if each.name != "head.nii.gz"}
+
+    def test_a_failure_leaves_no_file_and_a_status(self):
+        seen = set()
+        for document, line in self.lines():
+            with self.subTest(line):
+                ran, files = self.run_line(line, lambda *_: (200, {}, MESH))
+                self.assertEqual(ran.returncode, 0, ran.stderr)
+                (name,) = files
+                self.assertEqual(files, {name: MESH})
+                self.assertNotEqual(name, "response")
+                ran, files = self.run_line(line, lambda *_: (422, {}, b'{"detail":"the surface is empty"}'))
+                self.assertNotEqual(ran.returncode, 0)
+                self.assertEqual(files, {})
+                if "POST" in line:
+                    self.assertIn("the surface is empty", ran.stdout)
+                elsewhere = line.replace("http://127.0.0.1:8080", "http://127.0.0.1:1")
+                ran, files = self.run_line(elsewhere, None)
+                self.assertNotEqual(ran.returncode, 0)
+                self.assertEqual(files, {})
+                seen.add(document)
+        self.assertLessEqual({"README.md", "http.md", "for-web-developers.md"}, seen)
 
 
 if __name__ == "__main__":

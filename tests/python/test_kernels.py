@@ -232,8 +232,10 @@ except KeyboardInterrupt:
         ):
             with self.subTest(text), self.assertRaisesRegex(kind, text):
                 isomesh_kernels.mesh(array, **keywords)
-        with self.assertWarnsRegex(isomesh_client.VolumeWarning, "the iso-value 5 is outside the samples' range"):
-            empty = isomesh_kernels.mesh(ball(), iso=5)
+        reason = r"the iso-value 5 separates none of the samples of the volume, which range from .* suggested iso-value is -"
+        with self.assertRaisesRegex(isomesh_client.EmptySurface, reason):
+            isomesh_kernels.mesh(ball(), iso=5)
+        empty = isomesh_kernels.mesh(ball(), iso=5, allow_empty=True)
         self.assertEqual((empty.vertices.shape, empty.faces.shape), ((0, 3), (0, 3)))
         with self.assertRaisesRegex(ValueError, "at least 1, not 0"):
             isomesh_kernels.set_threads(0)

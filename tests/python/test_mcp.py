@@ -149,6 +149,20 @@ class Mcp(DaemonTest):
             self.assertEqual(files, [{"file": "again.stl", "bytes": size}])
         self.assertEqual(client.status, 0)
 
+    def test_an_empty_surface_is_an_error_unless_it_is_allowed(self):
+        wanted = {"files": ["ball.mhd"], "parameters": {"iso": 1000}}
+        with self.session() as client:
+            refused = client.call("mesh", **wanted, output=["none.stl"])
+            self.assertTrue(refused["isError"])
+            self.assertRegex(refused["content"][0]["text"], "the surface is empty: the iso-value 1000 separates none .*allow_empty accepts")
+            job = client.call("jobs")["structuredContent"]["jobs"][0]["id"]
+            self.assertTrue(client.call("fetch", job=job, output=["none.stl"])["isError"])
+            self.assertFalse((self.place / "none.stl").exists())
+            self.assertFalse(client.call("mesh", **wanted, output=["made.stl"], allow_empty=True)["isError"])
+            self.assertFalse(client.call("fetch", job=job, output=["fetched.stl"], allow_empty=True)["isError"])
+        for name in ("made.stl", "fetched.stl"):
+            self.assertEqual((self.place / name).stat().st_size, 84)
+
     def test_labels_and_masks(self):
         folder = self.place / "masks"
         folder.mkdir()

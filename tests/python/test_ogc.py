@@ -71,6 +71,12 @@ class Processes(DaemonTest):
         self.assertEqual((status, body), (204, None))
         self.assertRegex(headers["Link"], r'^<http.*mesh\.stl>; rel="mesh"$')
 
+    def test_an_empty_surface_is_told(self):
+        location, job = self.execute("document", iso=1000)
+        status = self.ended(location, job)
+        self.assertEqual(status["status"], "successful")
+        self.assertRegex(status["message"], "The surface is empty: the iso-value 1000 separates none")
+
     def test_labels_have_the_file_of_their_format(self):
         samples = numpy.zeros((12, 12, 12), "uint8")
         samples[2:5, 2:5, 2:5] = 1

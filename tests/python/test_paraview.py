@@ -50,7 +50,10 @@ class ParaView(DaemonTest):
         self.assertEqual(seen["labels"]["arrays"]["label"], [len(both.faces), 1, 2])
         self.assertEqual(seen["one label"]["arrays"]["label"][1:], [2, 2])
 
-        for name, reason in (("no server", "127.0.0.1:9"), ("wrong labels", 'labels: must be "all"')):
+        self.assertEqual(seen["allowed"]["cells"], 0)
+        self.assertEqual(ran.stderr.count("the surface is empty"), 1, ran.stderr)
+        wrong = (("no server", "127.0.0.1:9"), ("wrong labels", 'labels: must be "all"'), ("empty", "the iso-value 5 separates none"))
+        for name, reason in wrong:
             self.assertEqual(seen[name]["cells"], 0, name)
             self.assertIn(reason, ran.stderr)
 

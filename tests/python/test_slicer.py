@@ -76,6 +76,12 @@ class Slicer(DaemonTest):
         self.assertGreater(len(model.bytes), 84)
         self.assertEqual(len(model.bytes), 84 + 50 * int.from_bytes(model.bytes[80:84], "little"))
 
+    def test_an_empty_surface_is_an_error_unless_it_is_allowed(self):
+        node = Node(bytes_=nrrd(ball(), "float"))
+        with self.assertRaisesRegex(RuntimeError, "isomesh: the surface is empty: the iso-value 5 separates none"):
+            self.logic.mesh(node, iso=5)
+        self.assertEqual(self.logic.mesh(node, iso=5, allow_empty=True), [])
+
     def test_segments_become_models_with_names_and_colours(self):
         samples = numpy.zeros((12, 12, 12), "uint8")
         samples[2:6, 3:9, 3:9], samples[6:10, 3:9, 3:9] = 1, 2

@@ -7,6 +7,7 @@
 
 #include "base/sha256.h"
 #include "base/text.h"
+#include "proto/empty_surface.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
@@ -203,7 +204,7 @@ std::vector<Document> documents_of(const store::OrderRecord& record, const Job& 
         is_sent_as(record, SendFormat::kSr) || is_sent_as(record, SendFormat::kSeg);
     if (!documents.empty() || has_others) return documents;
   }
-  throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
+  throw empty_surface(job.mesh.value_or(MeshSummary{}), "");
 }
 
 dicom::DerivedObject common_of(const store::OrderRecord& record, const Making& making,
@@ -327,20 +328,6 @@ std::uint64_t bytes_of(const dicom::Envelope& envelope, const Document& document
 constexpr std::uint64_t kGrowthOfText = 400;
 
 }  // namespace
-
-Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range) {
-  const auto because = [](const std::string& why) {
-    return Error(ErrorCode::kUnusableVolume, "the surface is empty: " + why);
-  };
-  if (mesh.dropped.components > 0) return because("none of its connected components was kept");
-  if (!mesh.iso) return because("the labels have no boundary");
-  const auto [low, high] = range;
-  const std::string iso = "the iso-value " + number_text(*mesh.iso);
-  const std::string samples =
-      "the samples, which range from " + number_text(low) + " to " + number_text(high);
-  const bool is_outside = *mesh.iso <= low || *mesh.iso > high;
-  return because(iso + (is_outside ? " is outside " : " separates none of ") + samples);
-}
 
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const Making& making, store::BlobStore& blobs,

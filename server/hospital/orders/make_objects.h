@@ -42,14 +42,10 @@ struct Making {
 // segmentation with the samples of all labels that have a surface. UIDs are
 // derived from the content, so the same images with the same mesh always have the same UIDs.
 // `stored` gets the keys of the blobs, which no record names yet, also if it throws. Throws Error
-// kUnusableVolume for an empty surface, kTooLarge if an object exceeds `most_bytes`, kCancelled,
-// and as BlobWriter.
+// kEmptySurface, kTooLarge if an object exceeds `most_bytes`, kCancelled, and as BlobWriter.
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const Making& making, store::BlobStore& blobs,
                                      std::vector<std::string>& stored);
-
-// The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
-Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);
 
 // The number of triangles with which no mesh exceeds `most_bytes`; empty if none does. Throws Error
 // kTooLarge if not even one triangle fits.

@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/sha256.h"
+#include "proto/empty_surface.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "server/hospital/orders/make_objects.h"
@@ -345,10 +346,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::sto
   record.work.blobs.clear();
   std::vector<MadeObject> objects;
   if (!record.order.send.empty()) {
-    if (job.mesh && job.mesh->triangles == 0) {
-      throw empty_surface(*job.mesh,
-                          services_.volumes.get(record.owner, *record.order.volume).range);
-    }
+    if (job.mesh && job.mesh->empty) throw empty_surface(*job.mesh, "");
     check_count_of_objects(record.order, job);
     if (!can_make_objects(job, services_.blobs, stop)) {
       record.order.job = services_.jobs.remake(job.id).id;

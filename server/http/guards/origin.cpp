@@ -117,7 +117,8 @@ void allow_reading(const OriginRules& rules, const Request& request, Response& r
   response.set_header("Access-Control-Allow-Origin", origin);
   response.set_header("Access-Control-Expose-Headers",
                       "Accept-Ranges, Allow, Content-Disposition, Content-Range, ETag, "
-                      "Isomesh-Sample-Type, Isomesh-Slice, Isomesh-Upload, Location, Repr-Digest, "
+                      "Isomesh-Notes, Isomesh-Sample-Type, Isomesh-Slice, Isomesh-Upload, Link, "
+                      "Location, Repr-Digest, "
                       "Retry-After, Server-Timing, Upload-Complete, "
                       "Upload-Length, Upload-Limit, Upload-Offset, X-Request-Id");
 }

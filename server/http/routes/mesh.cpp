@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/sha256.h"
 #include "base/text.h"
+#include "proto/empty_surface.h"
 #include "proto/fields.h"
 #include "proto/json.h"
 #include "server/codec/formats.h"
@@ -50,12 +51,32 @@ std::optional<ByteRange> part_of(const Request& request, Response& response,
   }
 }
 
-Job submit_with_volume(App& app, const Request& request) {
+constexpr const char* kAllowEmpty = "allow_empty";
+
+// The codes of a volume's notes, each once. So its length is bounded by the number of codes.
+std::string codes_of(const std::vector<Note>& notes) {
+  std::set<std::string_view> told;
+  std::string text;
+  for (const Note& note : notes) {
+    if (told.insert(note.code).second) text += (text.empty() ? "" : ", ") + note.code;
+  }
+  return text;
+}
+
+// A job and what its response says of the volume.
+struct JobOfUpload {
+  Job job;
+  std::string notes;
+};
+
+JobOfUpload submit_with_volume(App& app, const Request& request) {
   std::vector<std::pair<std::string, std::string>> job_query;
   std::set<std::string> names;  // all names: this only checks for duplicates
   for (const auto& parameter : request.query) {
     names.insert(parameter.first);
-    if (!import_parameters().contains(parameter.first)) job_query.push_back(parameter);
+    const bool is_of_job =
+        !import_parameters().contains(parameter.first) && parameter.first != kAllowEmpty;
+    if (is_of_job) job_query.push_back(parameter);
   }
   check_known(request, names);
   JobParameters parameters = parse_job_parameters(job_query, VolumeIn::kBody);
@@ -78,24 +99,33 @@ Job submit_with_volume(App& app, const Request& request) {
     return app.services.library.add(owner_of(request), file.body().path, options, file.body().name,
                                     party_of(request));
   };
-  parameters.volume = counting_refusals(app, request, add).first.id;
+  const Volume volume = counting_refusals(app, request, add).first;
+  parameters.volume = volume.id;
   // A key belongs to one request: the same volume (by its id), the same parameters and this route
-  // ("mesh").
+  // ("mesh"). It may come again with `allow_empty`, which changes no job.
   const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
-  return submitted(app,
-                   {owner_of(request), complete_parameters(app, request, parameters), key, digest});
+  const Job job = submitted(
+      app, {owner_of(request), complete_parameters(app, request, parameters), key, digest});
+  return {job, codes_of(volume.notes)};
 }
 
 // The request's body is the volume, the response the mesh.
 std::optional<Continuation> mesh_in_one(App& app, const Request& request, Response& response) {
-  const auto answer = [&app](const Request& asked, Response& out, const Job& job) {
-    out.set_header("Location", "/v1/jobs/" + job.id);
-    if (!is_final(job.state) && app.stopping) {
+  const bool allows_empty = flag_of(request, kAllowEmpty, false);
+  const auto [job, notes] = submit_with_volume(app, request);
+  const auto answer = [&app, allows_empty, notes = notes](const Request& asked, Response& out,
+                                                          const Job& now) {
+    out.set_header("Location", "/v1/jobs/" + now.id);
+    out.set_header("Link", "</v1/volumes/" + now.parameters.volume + ">; rel=\"describedby\"");
+    if (!notes.empty()) out.set_header("Isomesh-Notes", notes);
+    if (!is_final(now.state) && app.stopping) {
       throw Error(ErrorCode::kUnavailable, "the service is shutting down");
     }
-    answer_mesh(app, asked, out, job, {job.parameters.formats.front(), std::nullopt});
+    if (now.mesh && now.mesh->empty && !allows_empty) {
+      throw empty_surface(*now.mesh, "allow_empty=true accepts that");
+    }
+    answer_mesh(app, asked, out, now, {now.parameters.formats.front(), std::nullopt});
   };
-  const Job job = submit_with_volume(app, request);
   auto continuation =
       answer_at_end(app, request, response, job, limits::kLongestSynchronousJob, answer);
   // Without an idempotency key the client cannot return for the job.

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "proto/empty_surface.h"
 #include "server/jobs/library/intact_volume.h"
 #include "server/jobs/library/label_samples.h"
 #include "server/jobs/making/stage_times.h"
@@ -64,6 +65,10 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                                    [&] { return process.make(order, sinks, stop, pass_on); });
   const auto stored = Clock::now();
   PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
+  if (result.mesh.empty) {
+    result.mesh.empty_reason =
+        why_empty(parameters, result.mesh, {volume.range, volume.suggested_iso});
+  }
   for (std::size_t i = 0; i < files.size(); ++i) {
     const store::Blob blob = writers[i]->commit(stop);
     result.mesh.files[files[i]] = {blob.bytes, blob.key, ""};

@@ -207,10 +207,14 @@ class Runner:
             except ValueError as error:
                 raise Bad(f"mesh: {status} and no JSON: {answer[:500]!r}") from error
             self.remember(case, headers.get("Location"))
+            if problem.get("type", "").endswith(":empty-surface") and not self.ask_json("GET", headers["Location"])[1]["mesh"]["empty"]:
+                raise Bad(f"mesh: there is a surface, but {json.dumps(problem)}")
             return [self.problem(status, problem, "mesh")]
         job_path = headers["Location"]
         self.remember(case, job_path)
         _, job = self.ask_json("GET", job_path)
+        if job["mesh"]["empty"]:
+            raise Bad("mesh: an empty surface that nobody has accepted")
         return self.check_job(case, job, {case.body.get("formats", ["drc"])[0]: answer})
 
     def remember(self, case, path):

@@ -262,10 +262,11 @@ TEST_F(Commands, QuietSaysNothing) {
 
 TEST_F(Commands, AnEmptySurfaceWritesNothingUnlessThatIsAccepted) {
   job_.mesh->empty = true;
+  job_.mesh->empty_reason = "the labels have none";
   test::write_file(folder_ / "head.drc", "old");
   const Outcome refused = outcome_of(options_);
   EXPECT_EQ(refused.status, kRefused);
-  EXPECT_THAT(refused.err, HasSubstr("the surface is empty"));
+  EXPECT_THAT(refused.err, HasSubstr("the surface is empty: the labels have none; --allow-empty"));
   EXPECT_EQ(refused.out, "");
   EXPECT_EQ(test::read_file(folder_ / "head.drc"), "old");
   options_.json = true;
@@ -279,6 +280,10 @@ TEST_F(Commands, AnEmptySurfaceWritesNothingUnlessThatIsAccepted) {
   fetching.outputs = {{.path = folder_ / "fetched.drc", .format = MeshFormat::kDrc}};
   EXPECT_EQ(outcome_of(fetching).status, kRefused);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "fetched.drc"));
+  Options telling = fetching;
+  telling.command = Command::kStatus;
+  telling.json = false;
+  EXPECT_THAT(outcome_of(telling).out, HasSubstr("empty: the labels have none"));
   Options piped = options_;
   piped.json = false;
   piped.outputs = {{.path = "-", .format = MeshFormat::kDrc}};

@@ -444,7 +444,8 @@ class OrdersTest : public test::JobsFixture {
     const store::Blob blob = test::put(blobs_, stl);
     store::Outcome outcome;
     outcome.mesh.emplace().triangles = triangles;
-    if (triangles == 0) outcome.mesh->iso = 1000;
+    outcome.mesh->empty = triangles == 0;
+    if (outcome.mesh->empty) outcome.mesh->empty_reason = "the iso-value separates no samples";
     outcome.mesh->labels_count = labels_of_mesh_;
     outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
     if (bytes_of_obj_ > 0) {

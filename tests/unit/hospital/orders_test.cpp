@@ -37,14 +37,13 @@ TEST_F(OrdersTest, TheirFirstQueryIsInTheAuditTrailWithItsOutcome) {
   EXPECT_THAT(outcomes_of("110112", prompt), ElementsAre("success"));
 }
 
-// The error names the iso-value and the range of the samples, which explain the empty surface.
-TEST_F(OrdersTest, AnEmptySurfaceIsToldWithTheRangeOfTheSamples) {
+TEST_F(OrdersTest, AnEmptySurfaceIsToldWithTheReasonOfItsJob) {
   const std::string id = submit();
   ASSERT_TRUE(finish_job(0));
   ASSERT_TRUE(reaches(id, OrderState::kFailed));
-  EXPECT_EQ(get(id).error->detail,
-            "the surface is empty: the iso-value 1000 is outside the samples, which range from 0 "
-            "to 257");
+  const Problem error = get(id).error.value();
+  EXPECT_EQ(error.type, "urn:isomesh:problem:empty-surface");
+  EXPECT_EQ(error.detail, "the surface is empty: the iso-value separates no samples");
 }
 
 // Each label is an object, and each object an entry of the order's results.

@@ -44,6 +44,7 @@ int status_in_the_contract(ErrorCode code) {
     case ErrorCode::kRangeNotSatisfiable:
       return 416;
     case ErrorCode::kUnusableVolume:
+    case ErrorCode::kEmptySurface:
     case ErrorCode::kKeyReused:
       return 422;
     case ErrorCode::kTooManyRequests:

@@ -1,7 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import type { Job } from '@/api/types';
+import { emptyReason } from '@/api/problem';
 import { changeOf } from '@/job/changes';
-import { emptyReason } from '@/job/empty';
 import { millimetres } from '@/ui/format';
 import { histogramPath, untangledText } from '@/views/jobs/certificate';
 import { stepsOf, totalOf } from '@/views/jobs/charts';
@@ -33,26 +32,10 @@ describe('the slider of the largest error', () => {
   });
 });
 
-function emptyJob(parameters: object, mesh: object = {}): Job {
-  return { parameters, mesh: { dropped: { components: 0, triangles: 0 }, ...mesh } } as unknown as Job;
-}
-
 describe('why a surface is empty', () => {
-  const volume = { range: [0, 255] as [number, number] };
-
-  it('is an iso-value outside the samples, which are told', () => {
-    expect(emptyReason(emptyJob({ iso: 300 }, { iso: 300 }), volume)).toBe(
-      "There is no surface at the iso-value 300: the volume's samples range from 0 to 255. Choose an iso-value between these limits.",
-    );
-    expect(emptyReason(emptyJob({ iso: 0 }, { iso: 0 }), volume)).toMatch(/Choose an iso-value between/);
-    expect(emptyReason(emptyJob({ iso: 300 }), null)).toBe('There is no surface at the iso-value 300.');
-  });
-
-  it('is what the parameters left out, or a box without any', () => {
-    const dropped = { iso: 60, dropped: { components: 3, triangles: 90 } };
-    expect(emptyReason(emptyJob({ iso: 60 }, dropped), volume)).toMatch(/all 3 connected components were dropped/);
-    expect(emptyReason(emptyJob({ iso: 60, crop: [[0, 0, 0], [1, 1, 1]] }, { iso: 60 }), volume)).toMatch(/within the box.*a larger box/);
-    expect(emptyReason(emptyJob({ labels: 'all' }), volume)).toMatch(/no boundary/);
+  it('is what the server says', () => {
+    expect(emptyReason({ empty_reason: 'the chosen labels have no boundary' })).toBe('The surface is empty: the chosen labels have no boundary.');
+    expect(emptyReason({})).toBe('The surface is empty.');
   });
 });
 

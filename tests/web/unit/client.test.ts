@@ -4,7 +4,7 @@ import * as fs from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import { ApiError, Client, type Job } from '@/api/index';
+import { adviceFor, ApiError, Client, type Job } from '@/api/index';
 import { Connection } from '@/api/connection';
 import { Daemon, eventually, id } from './daemon';
 
@@ -139,6 +139,15 @@ describe('the mesh of a job', () => {
     for (const none of [ofLabels([{ label: 5, files }, { label: 6, files }]), job, { ...job, mesh: null } as Job]) {
       expect(await rejectionOf(client.meshOf(none, 'stl'))).toBeInstanceOf(RangeError);
     }
+  });
+
+  it('is an error without a surface, unless that is allowed', async () => {
+    const files = { stl: { href: `/v1/jobs/${id}/mesh.glb` } };
+    const empty = { ...(await client.getJob(id)), mesh: { empty: true, empty_reason: 'it has none', files } } as unknown as Job;
+    const error = await rejectionOf(client.meshOf(empty, 'stl'));
+    expect(error).toMatchObject({ status: 422, detail: 'The surface is empty: it has none. The option allowEmpty accepts that.' });
+    expect(adviceFor(error as ApiError)).toBe('');
+    expect((await client.meshOf(empty, 'stl', undefined, { allowEmpty: true })).byteLength).toBeGreaterThan(0);
   });
 });
 

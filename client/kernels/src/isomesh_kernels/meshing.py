@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy
 from isomesh_client import Mesh, Raw
-from isomesh_client.errors import warn, warn_of_notes
-from isomesh_client.mesh import why_empty
+from isomesh_client.errors import warn_of_notes
+from isomesh_client.files import expect_surface
 from isomesh_client.parameters import OMITTED, as_plain, by_keywords, given
 from isomesh_client.uploads import described
 
@@ -33,6 +33,7 @@ def mesh(
     modality: str = "",
     memory_bytes: Optional[int] = None,
     progress: Optional[Progress] = None,
+    allow_empty: bool = False,
     # `generate` writes these lines: the parameters of a mesh.
     iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
     label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
@@ -57,6 +58,7 @@ def mesh(
     modality  "ct" says that samples are Hounsfield units; then there are iso-values with names: iso="bone"
     memory_bytes  the most that may be taken beside the array. Default: the memory of the machine
     progress  a function that is called with the share that is done, 0 to 1, up to 20 times a second
+    allow_empty  True returns a mesh without vertices and faces if the surface is empty, instead of raising
 
     All other keywords are parameters of the API; `help(isomesh_client.api.JobOptions)` describes them. Lengths are
     millimetres. `iso` or `labels` is required; iso="otsu" is Otsu's threshold.
@@ -72,7 +74,7 @@ def mesh(
     Other threads of Python run meanwhile. An interrupt (Ctrl-C), and an exception of `progress`, ends the work at once.
 
     Raises ValueError for wrong arguments and samples, TypeError for types, and MemoryError if the mesh would take more
-    memory than allowed, with the sentences of the service. An empty surface gives a VolumeWarning.
+    memory than allowed, with the sentences of the service. Raises isomesh_client.EmptySurface if there is no surface.
     """
     parameters = given(locals())
     samples, raw, notes, left_out = _prepared(array, affine, affine_space, spacing, axes)
@@ -87,9 +89,7 @@ def mesh(
     job: Any = json.loads(made.job)
     done = _mesh_of(run, made, job, notes)
     warn_of_notes([each for each in notes if each["code"] != "copied"], "the array")
-    if job["mesh"]["empty"]:
-        volume: Any = {"range": [float(samples.min()), float(samples.max())]}
-        warn(f"the surface is empty: {why_empty(job, volume)}")
+    expect_surface(job, allow_empty)
     warn_of_notes(job["mesh"].get("notes", []), "the mesh")
     return done
 

@@ -14,7 +14,7 @@ uploaded. `isomesh_client.api` has the types of the server's requests and respon
 from . import api
 from .batches import Result
 from .client import Client
-from .errors import IsomeshError, JobFailed, Refused, Unreachable, VolumeWarning, WrongAnswer
+from .errors import EmptySurface, IsomeshError, JobFailed, Refused, Unreachable, VolumeWarning, WrongAnswer
 from .mesh import Mesh, read_ply
 from .uploads import Raw
 from .version import __version__
@@ -22,6 +22,7 @@ from .viewer import View, view
 
 __all__ = [
     "Client",
+    "EmptySurface",
     "IsomeshError",
     "JobFailed",
     "Mesh",

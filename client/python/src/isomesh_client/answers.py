@@ -11,8 +11,8 @@ from .errors import WrongAnswer
 Members = Mapping[str, Any]
 
 _NULL = type(None)
-_MESH: Members = {"empty": bool, "files": dict, "dropped": {"components": int}}
-VOLUME: Members = {"id": str, "notes": [{"code": str, "detail": str}], "range": list}
+_MESH: Members = {"empty": bool, "files": dict}
+VOLUME: Members = {"id": str, "notes": [{"code": str, "detail": str}]}
 UPLOADED: Members = {
     "volumes": [{"member": str, "volume": (VOLUME, _NULL), "problem": ({"detail": str}, _NULL)}],
 }

@@ -713,8 +713,11 @@ class MeshSummary(TypedDict):
     #: The iso-value that was used, also for Otsu's. Left out for a job by labels.
     iso: NotRequired[float]
     #: There is no surface: the iso-value is outside the samples' range, or no connected component
-    #: remained. The files have no triangles.
+    #: remained. The job succeeds all the same, and its files have no triangles.
     empty: bool
+    #: The reason, with the range of the volume's samples and its suggested iso-value if they help.
+    #: Only for an empty surface. A job of an older server does not have it.
+    empty_reason: NotRequired[str]
     triangles: int
     vertices: int
     #: Edges that belong to one triangle only. They lie on the volume's border. A surface made with
@@ -984,7 +987,7 @@ class Problem(TypedDict):
     """Describes what went wrong (RFC 9457)."""
 
     #: A stable name, for programs.
-    type: Literal['urn:isomesh:problem:invalid-parameter', 'urn:isomesh:problem:digest-mismatch', 'urn:isomesh:problem:unauthorized', 'urn:isomesh:problem:forbidden', 'urn:isomesh:problem:not-found', 'urn:isomesh:problem:method-not-allowed', 'urn:isomesh:problem:not-ready', 'urn:isomesh:problem:gone', 'urn:isomesh:problem:length-required', 'urn:isomesh:problem:too-large', 'urn:isomesh:problem:uri-too-long', 'urn:isomesh:problem:unsupported-media', 'urn:isomesh:problem:range-not-satisfiable', 'urn:isomesh:problem:unusable-volume', 'urn:isomesh:problem:key-reused', 'urn:isomesh:problem:too-many-requests', 'urn:isomesh:problem:internal', 'urn:isomesh:problem:unavailable', 'urn:isomesh:problem:out-of-space', 'urn:isomesh:problem:cancelled', 'urn:isomesh:problem:request-timeout', 'urn:isomesh:problem:precondition-failed', 'urn:isomesh:problem:headers-too-large', 'urn:isomesh:problem:pacs-unreachable', 'urn:isomesh:problem:pacs-refused', 'urn:isomesh:problem:series-incomplete', 'https://iana.org/assignments/http-problem-types#mismatching-upload-offset']
+    type: Literal['urn:isomesh:problem:invalid-parameter', 'urn:isomesh:problem:digest-mismatch', 'urn:isomesh:problem:unauthorized', 'urn:isomesh:problem:forbidden', 'urn:isomesh:problem:not-found', 'urn:isomesh:problem:method-not-allowed', 'urn:isomesh:problem:not-ready', 'urn:isomesh:problem:gone', 'urn:isomesh:problem:length-required', 'urn:isomesh:problem:too-large', 'urn:isomesh:problem:uri-too-long', 'urn:isomesh:problem:unsupported-media', 'urn:isomesh:problem:range-not-satisfiable', 'urn:isomesh:problem:unusable-volume', 'urn:isomesh:problem:empty-surface', 'urn:isomesh:problem:key-reused', 'urn:isomesh:problem:too-many-requests', 'urn:isomesh:problem:internal', 'urn:isomesh:problem:unavailable', 'urn:isomesh:problem:out-of-space', 'urn:isomesh:problem:cancelled', 'urn:isomesh:problem:request-timeout', 'urn:isomesh:problem:precondition-failed', 'urn:isomesh:problem:headers-too-large', 'urn:isomesh:problem:pacs-unreachable', 'urn:isomesh:problem:pacs-refused', 'urn:isomesh:problem:series-incomplete', 'https://iana.org/assignments/http-problem-types#mismatching-upload-offset']
     #: The type in words.
     title: str
     #: The HTTP status.

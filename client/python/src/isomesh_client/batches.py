@@ -69,6 +69,7 @@ class Batches:
         workers: int = 4,
         skip_existing: bool = False,
         progress: Union[bool, Callable[[Result], object]] = False,
+        allow_empty: bool = False,
         spacing: Optional[Sequence[float]] = None,
         accept: Sequence[str] = (),
         masks: bool = False,
@@ -139,12 +140,12 @@ class Batches:
                 return Result(source, path=path, skipped=True)
             try:
                 if path is None:
-                    mesh = client.mesh(source, **of_upload, **parameters)
+                    mesh = client.mesh(source, allow_empty=allow_empty, **of_upload, **parameters)
                     return Result(source, mesh=mesh, job=mesh.job)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 wanted = {**parameters, "formats": [format_of(path)]}
                 _, job = client._made(source, of_upload, wanted, None)
-                client.download(job, path)
+                client.download(job, path, allow_empty=allow_empty)
                 return Result(source, path=path, job=job)
             except Exception as error:
                 return Result(source, path=path, error=error)

@@ -10,15 +10,18 @@ import time
 import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union, cast
-from urllib.parse import quote, urlencode
+from urllib.parse import urlencode
 
 from . import answers, busy, ply, uploads
 from .batches import Batches
 from .errors import IsomeshError, JobFailed, Refused, Unreachable, warn_of_notes
 from .exchange import Exchange
-from .files import FINAL_STATES, Arriving, file_of, files_of_mesh, format_of, written
-from .mesh import Mesh, warn_of_mesh
+from .files import FINAL_STATES, Arriving, expect_surface, file_of, files_of_mesh, format_of, written
+from .mesh import Mesh
 from .parameters import OMITTED, as_query, by_keywords, given
+from .paths import id_of as _id_of
+from .paths import job_path as _job_path
+from .paths import volume_path as _volume_path
 from .transport import Transport
 
 if TYPE_CHECKING:
@@ -89,6 +92,7 @@ class Client(Batches):
         nifti_form: str = "",
         modality: str = "",
         progress: Optional[Progress] = None,
+        allow_empty: bool = False,
         # `generate` writes these lines: the parameters of a job.
         iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
         label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
@@ -109,14 +113,15 @@ class Client(Batches):
 
         source    everything that `upload` takes, or a stored volume: its id or its dict
         progress  a function that is called with the job about once a second
+        allow_empty  True returns a mesh without vertices and faces if the surface is empty, instead of raising
 
         `affine` to `modality` are as for `upload`. All other keywords are parameters of the job;
         `help(isomesh_client.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
         besides `.ply`.
 
         Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The volume's
-        notes are in `mesh.notes`. Each of them gives a VolumeWarning, and so does an empty surface. Raises
-        JobFailed if the job fails. An interrupt (Ctrl-C) cancels the job.
+        notes are in `mesh.notes`, and each of them gives a VolumeWarning. Raises JobFailed if the job
+        fails, and EmptySurface if there is no surface. An interrupt (Ctrl-C) cancels the job.
         """
         keywords = locals()
         parameters = given(keywords)
@@ -126,6 +131,7 @@ class Client(Batches):
         formats = parameters.get("formats", [])
         parameters["formats"] = formats if "ply" in formats else [*formats, "ply"]
         stored, done = self._made(source, of_upload, parameters, progress)
+        expect_surface(done, allow_empty)
         return self._fetch(done, stored["notes"])
 
     # --- Volumes ---------------------------------------------------------------------------------
@@ -350,23 +356,25 @@ class Client(Batches):
 
     # --- Meshes ----------------------------------------------------------------------------------
 
-    def fetch(self, job: Union[str, AnyJob]) -> Mesh:
+    def fetch(self, job: Union[str, AnyJob], *, allow_empty: bool = False) -> Mesh:
         """The mesh of a succeeded job as arrays. The job's `formats` must include "ply". `mesh.notes`
-        is empty if the volume is no longer stored."""
+        is empty if the volume is no longer stored. Raises EmptySurface as `mesh` does."""
         done = self.job(job) if isinstance(job, str) else job
         file_of(done, "ply")
+        expect_surface(done, allow_empty)
         notes: Sequence[api.Note] = ()
         with contextlib.suppress(Refused):
             notes = self.volume(done["volume"])["notes"]
         return self._fetch(cast("api.SucceededJob", done), notes)
 
     def download(
-        self, job: Union[str, AnyJob], path: Union[str, os.PathLike[str]], *, label: Optional[int] = None
+        self, job: Union[str, AnyJob], path: Union[str, os.PathLike[str]], *, label: Optional[int] = None, allow_empty: bool = False
     ) -> Path:
         """Writes a file of the job to `path` and returns that path. The suffix selects the format.
         `label` selects one label's own surface. The file appears only when it is complete and matches
         the job's SHA-256. An OBJ of all labels gets its materials beside it: for `x.obj` the file
-        `x.mtl`, whose name replaces that in the OBJ. In that name, `_` stands for blanks and backslashes."""
+        `x.mtl`, whose name replaces that in the OBJ. In that name, `_` stands for blanks and backslashes.
+        Raises EmptySurface, and writes nothing, if the surface is empty and `allow_empty` is not True."""
         target = Path(path)
         done = self.job(job) if isinstance(job, str) else job
         form = format_of(target)
@@ -374,6 +382,7 @@ class Client(Batches):
         if label is not None and done["mesh"] is not None:
             labels = done["mesh"].get("labels") or self.job_labels(done)
         announced = file_of(done, form, label, labels)
+        expect_surface(done, allow_empty)
         is_by_labels = label is None and (done.get("parameters") or {}).get("labels") is not None
         beside = files_of_mesh(target, is_by_labels)[1:]
         with written(target) as file:
@@ -408,7 +417,7 @@ class Client(Batches):
                 parting._exchange = self._exchange.parting()
                 parting.cancel(parting._submit(stored, key, parameters))
             raise
-        warn_of_mesh(done, stored)
+        warn_of_notes(done["mesh"].get("notes", []), "the mesh")
         return stored, done
 
     def _stored(self, source: Any, of_upload: Mapping[str, Any]) -> Optional[api.Volume]:
@@ -478,21 +487,6 @@ def _is_empty(keyword: str, value: Any) -> bool:
     """True for a keyword's default. An empty place is no default but an error."""
     is_place = keyword in ("affine", "spacing")
     return value is None or value is False or not is_place and isinstance(value, (str, tuple, list)) and not value
-
-
-def _id_of(thing: Any) -> str:
-    found = thing if isinstance(thing, str) else thing["id"]
-    if not isinstance(found, str) or found in ("", ".", ".."):
-        raise ValueError(f"{found!r} is not an id")
-    return found
-
-
-def _volume_path(volume: Any) -> str:
-    return "/v1/volumes/" + quote(_id_of(volume), safe="")
-
-
-def _job_path(job: Any) -> str:
-    return "/v1/jobs/" + quote(_id_of(job), safe="")
 
 
 def _put(data: bytearray, at: int, piece: bytes) -> None:

@@ -29,8 +29,7 @@ class WrongAnswer(IsomeshError):
 
 
 class VolumeWarning(UserWarning):
-    """A note about a volume: something that the server decided or corrected when it read the file.
-    Also: the surface is empty."""
+    """A note about a volume: something that the server decided or corrected when it read the file."""
 
 
 def warn_of_notes(notes: Sequence[api.Note], name: str) -> None:
@@ -95,6 +94,15 @@ class JobFailed(IsomeshError):
         problem: Mapping[str, Any] = cast("Mapping[str, Any]", job.get("error") or {})
         reason = problem.get("detail") or f"the job was {job['state']}"
         super().__init__(f"job {job['id']}: {reason}")
+        self.job = job
+
+
+class EmptySurface(IsomeshError):
+    """A job has succeeded, and its mesh has no triangles. `allow_empty=True` accepts that. `job` is the job."""
+
+    def __init__(self, job: api.SucceededJob) -> None:
+        reason = job["mesh"].get("empty_reason")
+        super().__init__("the surface is empty" + (f": {reason}" if reason else "") + "; allow_empty=True accepts that")
         self.job = job
 
 

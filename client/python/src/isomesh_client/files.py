@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Iterable, Iterator, List, Optional, Union, cast, get_args
 
 from . import api
-from .errors import JobFailed
+from .errors import EmptySurface, JobFailed
 
 if TYPE_CHECKING:
     AnyJob = Union[api.Job, api.SucceededJob]
@@ -49,6 +49,13 @@ def file_of(
         f"job {job['id']} has no file of the format {form!r}{of_label}; it has {has}. "
         f"Add formats=[{form!r}] to the call that starts the job."
     )
+
+
+def expect_surface(job: AnyJob, allow_empty: bool) -> None:
+    """Raises EmptySurface for a mesh without triangles, unless that is allowed."""
+    mesh = job["mesh"]
+    if mesh is not None and mesh["empty"] and not allow_empty:
+        raise EmptySurface(cast("api.SucceededJob", job))
 
 
 def files_of_mesh(target: Path, is_by_labels: bool) -> List[Path]:

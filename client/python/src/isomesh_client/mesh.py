@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, Optional, Sequence, Union
 
 from . import files, ply, viewer
-from .errors import warn, warn_of_notes
 
 if TYPE_CHECKING:
     import os
 
     from . import api
 
-    Download = Callable[[api.SucceededJob, Path], Path]
+    Download = Callable[..., Path]
 
 
 class Mesh:
@@ -140,7 +139,7 @@ class Mesh:
         self._expect_unchanged(form)
         if self._download is None:
             raise ValueError("this mesh has no connection to a server; use client.download(mesh.job, path)")
-        return self._download(self._job, target)
+        return self._download(self._job, target, allow_empty=True)  # whoever has an empty mesh has accepted it
 
     def to_trimesh(self) -> Any:
         """The mesh as a trimesh.Trimesh with the same vertices and faces (int64). Labels become the
@@ -234,24 +233,6 @@ def read_ply(source: Union[bytes, bytearray, memoryview, str, os.PathLike[str]])
     """The mesh of a PLY file that isomesh wrote. Raises WrongAnswer for any other file."""
     data = source if isinstance(source, (bytes, bytearray, memoryview)) else Path(source).read_bytes()
     return Mesh(**ply.parse(data))
-
-
-def warn_of_mesh(job: api.SucceededJob, volume: api.Volume) -> None:
-    """Warns of an empty surface, and of each note on the mesh."""
-    if job["mesh"]["empty"]:
-        warn(f"the surface is empty: {why_empty(job, volume)}")
-    warn_of_notes(job["mesh"].get("notes", []), "the mesh")
-
-
-def why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
-    iso, (low, high) = job["mesh"].get("iso"), volume["range"]
-    if job["mesh"]["dropped"]["components"] > 0:
-        return "no connected component was kept"
-    if iso is None:
-        return "the labels have no surface"
-    if not low <= iso <= high:
-        return f"the iso-value {iso:g} is outside the samples' range, {low:g} to {high:g}"
-    return f"there is none at the iso-value {iso:g}"
 
 
 def _checked(space: str) -> str:

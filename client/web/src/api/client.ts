@@ -2,7 +2,7 @@
 import { Connection } from './connection';
 import { follow } from './follow';
 import { JobEvents } from './job_events';
-import { jsonOf, notTheApi } from './problem';
+import { emptySurface, jsonOf, notTheApi } from './problem';
 import type {
   Axis,
   ClientOptions,
@@ -233,12 +233,14 @@ export class Client {
 
   /**
    * Downloads a finished job's mesh in one of the formats that the job was asked for. Rejects with a RangeError if the
-   * job has no such file. Of a format that holds one label, a job with several labels has only the `zip`.
+   * job has no such file. Of a format that holds one label, a job with several labels has only the `zip`. Rejects with
+   * an ApiError with the status 422 if the surface is empty, unless `allowEmpty` is true.
    */
-  async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
+  async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal, { allowEmpty = false }: { allowEmpty?: boolean } = {}): Promise<ArrayBuffer> {
     const { files = {}, labels = [] } = job.mesh ?? {};
     const file = files[format] ?? (labels.length === 1 ? labels[0]?.files[format] : undefined);
     if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
+    if (job.mesh?.empty && !allowEmpty) throw emptySurface(job.mesh);
     return this.connection.bytes(file.href, { signal });
   }
 

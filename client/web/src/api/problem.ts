@@ -1,5 +1,5 @@
 import { isBusy, retryAfterOf, type HeaderValues } from './busy';
-import type { Choice, FieldFault, Problem } from './types';
+import type { Choice, FieldFault, MeshSummary, Problem } from './types';
 
 // How a request may succeed: by accepting a note, or by choosing one of several.
 export type Remedy = Pick<Problem, 'overridable' | 'choices'> & {
@@ -65,6 +65,18 @@ export function errorOf(status: number, body: string, headers?: HeaderValues): A
   return new ApiError(status, `HTTP status ${status}`, detail, [], {}, null, headers && retryAfterOf(headers));
 }
 
+const surfaceIsEmpty = 'The surface is empty';
+
+/** The reason why a mesh has no triangles, as a sentence. Jobs of an older server have none. */
+export function emptyReason({ empty_reason: reason }: Pick<MeshSummary, 'empty_reason'>): string {
+  return `${surfaceIsEmpty}${reason === undefined ? '' : `: ${reason}`}.`;
+}
+
+// As the server says it where a mesh is asked for.
+export function emptySurface(mesh: MeshSummary): ApiError {
+  return new ApiError(422, surfaceIsEmpty, `${emptyReason(mesh)} The option allowEmpty accepts that.`);
+}
+
 // For a response that lacks what the API says.
 export function notTheApi(): ApiError {
   return new ApiError(-1, 'The response is not one of isomeshd', 'A proxy before the server may ask for a login.');
@@ -127,7 +139,7 @@ const advice: readonly [statuses: number[], text: string][] = [
 
 /** Says in one sentence what a person can do. Empty if the error's detail already does. */
 export function adviceFor(error: ApiError): string {
-  const isSaid = error.status === 422 && /\. (Add|Choose|Give|Send|Upload) /.test(error.detail);
+  const isSaid = error.title === surfaceIsEmpty || (error.status === 422 && /\. (Add|Choose|Give|Send|Upload) /.test(error.detail));
   if (isSaid || error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
   return advice.find(([statuses]) => statuses.includes(error.status))?.[1] ?? '';
 }

@@ -13,17 +13,17 @@ function fileName(format: string): string {
 }
 
 export function curlSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
-  const lines = [`curl ${quoted(`${origin}/v1/jobs?wait=30`)}`];
+  const lines = [`curl --fail-with-body ${quoted(`${origin}/v1/jobs?wait=30`)}`];
   if (hasToken) lines.push(`-H "Authorization: Bearer $ISOMESH_TOKEN"`);
   lines.push(`-H 'Content-Type: application/json'`);
   lines.push(`-d ${quoted(JSON.stringify(jobRequest(job)))}`);
   const auth = hasToken ? ' -H "Authorization: Bearer $ISOMESH_TOKEN"' : '';
   const line = (name: string, format: string): string =>
-    `curl${auth} -o ${name} ${quoted(`${origin}/v1/jobs/`)}JOB/mesh.${format}`;
+    `curl --fail --remove-on-error${auth} -o ${name} ${quoted(`${origin}/v1/jobs/`)}JOB/mesh.${format}`;
   const downloads = filesOf(job).map((format) => line(fileName(format), format));
   // An OBJ of labels names the file of its colours.
   if (isByLabels(job) && filesOf(job).includes('obj')) downloads.push(line('mesh.mtl', 'mtl'));
-  return [`${lines.join(' \\\n  ')}`, '# JOB is the id in the answer', ...downloads].join('\n');
+  return [`${lines.join(' \\\n  ')}`, '# JOB is the id in the answer; its files have no triangles if "empty" is true there', ...downloads].join('\n');
 }
 
 function optionFor(parameter: Parameter, job: JobParameters): string {

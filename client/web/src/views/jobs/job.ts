@@ -1,9 +1,8 @@
 // One job: its way, then its surface. #/jobs/ID
 import { stages } from '../../../generated/parameters';
 import { client } from '../../client';
-import { asApiError, errorOfProblem } from '../../api/problem';
+import { asApiError, emptyReason, errorOfProblem } from '../../api/problem';
 import { isFinal, type Job, type Volume } from '../../api/types';
-import { emptyReason } from '../../job/empty';
 import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords } from '../../job/parameters';
 import { changeLink, eraseJob } from '../../job/variants';
@@ -182,7 +181,7 @@ function showSurface(
     head(job, source),
     ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
     check ? section('Before you print', check) : '',
-    section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),
+    section('Numbers', mesh.empty ? h('p.warning', emptyReason(mesh)) : numbers(job, mesh)),
     accuracy(job, () => void pane.showDistances()) ?? '',
     pane.components.element ?? '',
     times,

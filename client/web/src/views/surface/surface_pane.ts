@@ -1,6 +1,6 @@
 // A surface with its tools: what a job made, loaded part by part.
 import { client } from '../../client';
-import { asApiError, errorOfProblem } from '../../api/problem';
+import { asApiError, emptyReason, errorOfProblem } from '../../api/problem';
 import type { Job, MeshSummary, Vec3, Volume } from '../../api/types';
 import type { Block } from '../../mesh/blocks';
 import type { Part } from '../../mesh/glb';
@@ -13,7 +13,6 @@ import type { Surface } from '../../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../../scene/views';
 import type { LabelState } from '../../job/labels';
 import { withShownGlb } from '../../job/parameters';
-import { emptyReason } from '../../job/empty';
 import { changeLink, fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, isTyping } from '../../ui/dom';
 import { formatCount, formatSize } from '../../ui/format';
@@ -158,12 +157,8 @@ export class SurfacePane {
 
   // Null, and says why, where there is nothing to be shown.
   private async begin(mesh: MeshSummary): Promise<Surface | null> {
-    if (!viewableFile(this.job)) {
-      this.say(whyNotShown(this.job), h('a', { href: changeLink(this.job) }, 'Change parameters'));
-      return null;
-    }
-    if (mesh.triangles === 0) {
-      this.say(emptyReason(this.job, this.options.volume), h('a', { href: changeLink(this.job) }, 'Change parameters'));
+    if (mesh.empty || !viewableFile(this.job)) {
+      this.say(mesh.empty ? emptyReason(mesh) : whyNotShown(this.job), h('a', { href: changeLink(this.job) }, 'Change parameters'));
       return null;
     }
     const drawing = await surfaceDrawing().catch(() => null);
