@@ -305,6 +305,11 @@ TEST_F(NotesTest, OfAMeshAreShownWithIt) {
   const Finished closed = mesh("5");
   ASSERT_EQ(closed.status, 0) << closed.errors;
   EXPECT_THAT(closed.output, Not(HasSubstr("thin-walls")));
+  const std::string query = "/v1/mesh?format=stl&iso=0.5&fill_cavities=true&scheme=";
+  for (const std::string scheme : {"6", "5"}) {
+    const Answer answer = daemon_.send("POST", query + scheme, read_file(folder_ / "ball.nrrd"));
+    EXPECT_EQ(answer.headers.count("isomesh-notes"), scheme == "6" ? 1U : 0U);
+  }
 }
 
 // The codes are in a header of one length at most, and the volume has their texts.

@@ -2,8 +2,10 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <initializer_list>
 #include <memory>
 #include <set>
+#include <span>
 #include <vector>
 
 #include "base/log.h"
@@ -53,12 +55,14 @@ std::optional<ByteRange> part_of(const Request& request, Response& response,
 
 constexpr const char* kAllowEmpty = "allow_empty";
 
-// The codes of a volume's notes, each once. So its length is bounded by the number of codes.
-std::string codes_of(const std::vector<Note>& notes) {
+// The codes of notes, each once. So its length is bounded by the number of codes.
+std::string codes_of(std::initializer_list<std::span<const Note>> lists) {
   std::set<std::string_view> told;
   std::string text;
-  for (const Note& note : notes) {
-    if (told.insert(note.code).second) text += (text.empty() ? "" : ", ") + note.code;
+  for (const std::span<const Note> notes : lists) {
+    for (const Note& note : notes) {
+      if (told.insert(note.code).second) text += (text.empty() ? "" : ", ") + note.code;
+    }
   }
   return text;
 }
@@ -66,7 +70,7 @@ std::string codes_of(const std::vector<Note>& notes) {
 // A job and what its response says of the volume.
 struct JobOfUpload {
   Job job;
-  std::string notes;
+  std::vector<Note> notes;
 };
 
 JobOfUpload submit_with_volume(App& app, const Request& request) {
@@ -106,7 +110,7 @@ JobOfUpload submit_with_volume(App& app, const Request& request) {
   const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
   const Job job = submitted(
       app, {owner_of(request), complete_parameters(app, request, parameters), key, digest});
-  return {job, codes_of(volume.notes)};
+  return {job, volume.notes};
 }
 
 // The request's body is the volume, the response the mesh.
@@ -117,7 +121,9 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
                                                           const Job& now) {
     out.set_header("Location", "/v1/jobs/" + now.id);
     out.set_header("Link", "</v1/volumes/" + now.parameters.volume + ">; rel=\"describedby\"");
-    if (!notes.empty()) out.set_header("Isomesh-Notes", notes);
+    const std::string codes = codes_of(
+        {notes, now.mesh ? std::span<const Note>(now.mesh->notes) : std::span<const Note>()});
+    if (!codes.empty()) out.set_header("Isomesh-Notes", codes);
     if (!is_final(now.state) && app.stopping) {
       throw Error(ErrorCode::kUnavailable, "the service is shutting down");
     }
