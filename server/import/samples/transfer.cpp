@@ -378,8 +378,8 @@ void take_storage_order(const StorageOrder& fastest, Volume& volume) {
   volume.dims = volume::in_order(volume.dims, order);
 }
 
-// Makes the order of axes canonical, and that of the samples. Later calls change nothing. The
-// header of the file is then to be written again.
+}  // namespace
+
 void put_in_order(CanonicalWriter& writer, Volume& volume) {
   const volume::AxisOrder order = volume::canonical_order(volume.geometry);
   if (!volume.stored_axes) volume.stored_axes = volume::axis_codes(volume.geometry);
@@ -390,8 +390,6 @@ void put_in_order(CanonicalWriter& writer, Volume& volume) {
     throw_unusable("The geometry of the volume cannot be used: " + fault->message + ".");
   }
 }
-
-}  // namespace
 
 Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task) {
   if (auto labels = write_wide_labels(samples, volume, task)) return *std::move(labels);
