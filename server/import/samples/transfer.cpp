@@ -458,9 +458,9 @@ Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
   const bool is_closed = kind.is_segmentation && is_integer(volume.type);
   if (is_closed) {
     close_ends(writer, volume);
-  } else {
-    writer.shorten({volume.dims, volume.type, volume.geometry});
+    put_in_order(writer, volume);  // for the numbers of the new origin
   }
+  writer.shorten({volume.dims, volume.type, volume.geometry});
   if (kind.is_segmentation || is_converted) {
     statistics = volume::measure(writer.samples(), volume.type, left_out);
     volume.range = statistics.range;
