@@ -19,6 +19,7 @@
 #include "tests/bench/budget.h"
 #include "tests/bench/cluster.h"
 #include "tests/bench/findings.h"
+#include "tests/bench/imports.h"
 #include "tests/bench/label_stages.h"
 #include "tests/bench/label_table.h"
 #include "tests/bench/labels.h"
@@ -133,6 +134,13 @@ int run_lattices(const Options& options) {
   const Plan plan = plan_of(options);
   Output output(options.json);
   output.add("Lattices and smoothings", lattices_of(plan));
+  output.end();
+  return 0;
+}
+
+int run_imports(const Options& options) {
+  Output output(options.json);
+  output.add("Imports by order of axes", measure_imports());
   output.end();
   return 0;
 }
@@ -314,6 +322,9 @@ int run_program(int argc, char** argv) {
       "Every lattice, plain and regularised, and every smoothing of a ball and of "
       "--volume: triangles, angles, volume, distance and time");
   lattices->fallthrough();
+  CLI::App* imports = app.add_subcommand(
+      "imports", "Import a scan whose file has its axes in another order than the patient");
+  imports->fallthrough();
   CLI::App* budget = app.add_subcommand(
       "budget", "Fail if a stage takes more than twice its usual share of a plain loop's time");
   budget->fallthrough();
@@ -360,6 +371,7 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size_or_file, threads);
   if (*budget) return run_budget(options);
   warn_when_busy();
+  if (*imports) return run_imports(options);
   if (*service) return run_service(options, daemon);
   if (*cluster) return run_cluster(options, daemon);
   accuracy.with_peers = !only_fast;

@@ -378,8 +378,8 @@ void take_storage_order(const StorageOrder& fastest, Volume& volume) {
   volume.dims = volume::in_order(volume.dims, order);
 }
 
-// Makes the order of axes canonical, and that of the samples. Later calls change nothing. The
-// header of the file is then to be written again.
+}  // namespace
+
 void put_in_order(CanonicalWriter& writer, Volume& volume) {
   const volume::AxisOrder order = volume::canonical_order(volume.geometry);
   if (!volume.stored_axes) volume.stored_axes = volume::axis_codes(volume.geometry);
@@ -390,8 +390,6 @@ void put_in_order(CanonicalWriter& writer, Volume& volume) {
     throw_unusable("The geometry of the volume cannot be used: " + fault->message + ".");
   }
 }
-
-}  // namespace
 
 Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task) {
   if (auto labels = write_wide_labels(samples, volume, task)) return *std::move(labels);
@@ -460,9 +458,9 @@ Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
   const bool is_closed = kind.is_segmentation && is_integer(volume.type);
   if (is_closed) {
     close_ends(writer, volume);
-  } else {
-    writer.shorten({volume.dims, volume.type, volume.geometry});
+    put_in_order(writer, volume);  // for the numbers of the new origin
   }
+  writer.shorten({volume.dims, volume.type, volume.geometry});
   if (kind.is_segmentation || is_converted) {
     statistics = volume::measure(writer.samples(), volume.type, left_out);
     volume.range = statistics.range;

@@ -33,6 +33,12 @@ Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportT
 // task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
+// Makes the order of axes canonical (volume/geometry.h): that of the samples, with which the file
+// begins, and of dims and geometry of `volume`. Tells the order until then in `stored_axes`, unless
+// that is known. Changes nothing if it was done before. The header of the file remains to be
+// written. Throws Error kUnusableVolume.
+void put_in_order(CanonicalWriter& writer, Volume& volume);
+
 struct SampleKind {
   bool are_labels = false;  // by their header
   bool are_wide = false;    // stored as integers of 64 bits
@@ -43,13 +49,14 @@ struct SampleKind {
   std::uint64_t left_out = 0;
 };
 
-// Completes a canonical file, which begins with the samples of `volume`: measures and flushes them.
-// `volume` has dims, type and geometry; returns it with range, suggested iso-value and bytes set.
-// Samples that are not finite get the smallest sample's value; the suggested iso-value leaves them
-// and `left_out` samples out. Floats that are labels become integers of the smallest type: those
-// that `volume` or `kind` declares, and those that volume::mask_value() or label_count()
-// recognises, if all are nearly whole. So do wide integers that fit into 32 bits. Throws Error
-// kUnusableVolume if no sample is finite, kOutOfSpace, kInternal.
+// Completes a canonical file, which begins with the samples of `volume`: puts them in order,
+// measures and flushes them. `volume` has dims, type and geometry; returns it with range, suggested
+// iso-value and bytes set. Samples that are not finite get the smallest sample's value; the
+// suggested iso-value leaves them and `left_out` samples out. Floats that are labels become
+// integers of the smallest type: those that `volume` or `kind` declares, and those that
+// volume::mask_value() or label_count() recognises, if all are nearly whole. So do wide integers
+// that fit into 32 bits. Throws Error kUnusableVolume if no sample is finite, kOutOfSpace,
+// kInternal.
 Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind = {});
 
 }  // namespace isomesh::import

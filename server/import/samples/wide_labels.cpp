@@ -12,6 +12,7 @@
 #include "proto/samples.h"
 #include "server/import/labels/closed_ends.h"
 #include "server/volume/canonical.h"
+#include "server/volume/labels.h"
 
 namespace isomesh::import {
 namespace {
@@ -38,23 +39,16 @@ void for_each_piece(const PlainSamples& samples, std::uint64_t count, const Take
   }
 }
 
-// The range of samples, and how flat their regions are.
+// The range of samples.
 template <class Stored>
 struct Survey {
   Stored least = std::numeric_limits<Stored>::max();
   Stored most = std::numeric_limits<Stored>::min();
-  Stored last = 0;
-  std::uint64_t pairs = 0;  // of neighbours that are not both background
-  std::uint64_t same = 0;
 
   void take(std::span<const Stored> piece) {
     for (const Stored value : piece) {
       least = std::min(least, value);
       most = std::max(most, value);
-      const bool is_same = value == last;
-      pairs += is_same && value == 0 ? 0 : 1;
-      same += is_same && value != 0 ? 1 : 0;
-      last = value;
     }
   }
 
@@ -65,7 +59,6 @@ struct Survey {
     };
     return !fits(std::int32_t{}) && !fits(std::uint32_t{});
   }
-  bool is_flat() const { return static_cast<double>(same) >= kFlat * static_cast<double>(pairs); }
 };
 
 // The different values other than 0, ascending, until they are too many to be labels. They are
@@ -177,7 +170,7 @@ std::optional<Volume> write(const PlainSamples& samples, Volume volume, const Im
     return true;
   });
   const bool is_declared = samples.are_labels || !volume.labels.empty();
-  if (!survey.is_wide() || (!is_declared && !survey.is_flat())) return std::nullopt;
+  if (!survey.is_wide()) return std::nullopt;
   Values<Stored> found;
   bool are_few = true;
   for_each_piece<Stored>(samples, volume.sample_count(), [&](std::span<const Stored> piece) {
@@ -188,18 +181,25 @@ std::optional<Volume> write(const PlainSamples& samples, Volume volume, const Im
     return std::nullopt;
   }
   const std::vector<Stored>& values = found.all();
-  if (!std::in_range<std::int64_t>(values.back())) {
-    throw_unusable("The label " + std::to_string(values.back()) +
-                   " is too large: labels up to 9223372036854775807 are read. Number the labels "
-                   "anew and upload them again.");
-  }
-  volume.labels = entries_of(values, volume.labels);
   volume.type = values.size() <= std::numeric_limits<std::uint8_t>::max() ? SampleType::kUint8
                                                                           : SampleType::kUint16;
   const auto dims =
       samples.is_segmentation ? with_room(volume.dims, volume.type, task.limits) : volume.dims;
   CanonicalWriter writer(task.target, {dims, volume.type, volume.geometry});
   write_numbers(samples, values, volume, writer.samples().data());
+  put_in_order(writer, volume);
+  const auto numbered =
+      writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
+  if (!is_declared &&
+      volume::share_of_equal_neighbours(numbered, volume.type, volume.dims) < kFlat) {
+    return std::nullopt;
+  }
+  if (!std::in_range<std::int64_t>(values.back())) {
+    throw_unusable("The label " + std::to_string(values.back()) +
+                   " is too large: labels up to 9223372036854775807 are read. Number the labels "
+                   "anew and upload them again.");
+  }
+  volume.labels = entries_of(values, volume.labels);
   volume.notes.push_back(renumbered_note(values.size()));
   return finish(writer, std::move(volume), {.is_segmentation = samples.is_segmentation});
 }

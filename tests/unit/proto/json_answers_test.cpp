@@ -326,6 +326,16 @@ TEST(Records, OfAVolumeOfAnOlderVersionLackNothingThatItWrote) {
   }
 }
 
+TEST(Records, OfAVolumeTellTheOrderOfAxesInItsFile) {
+  Volume volume = some_volume();
+  volume.stored_axes = "RAS";
+  EXPECT_EQ(json::parse(to_json(volume))["stored_axes"], "RAS");
+  EXPECT_EQ(volume_from_record(to_record(volume)), volume);
+  json older = json::parse(to_full_json(volume));
+  ASSERT_EQ(older.erase("stored_axes"), 1U);
+  EXPECT_EQ(volume_from_record(older.dump()).stored_axes, std::nullopt);
+}
+
 // Older versions know no digest, and keep each member as they find it.
 TEST(Records, ChangedByAnOlderVersionCanBeRead) {
   JsonTree tree(to_record(queued_job()));
