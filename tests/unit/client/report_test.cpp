@@ -230,7 +230,7 @@ TEST(WallList, IsATable) {
            {.a = 3, .b = 12, .area_mm2 = 7, .faces = 1234, .a_name = "liver", .b_name = "gut"}},
           {"mm", "millimetres", 1e-3}),
       "  label  name   label  name            mm²  faces\n"
-      "      3  liver         background  1,234.6       \n"
+      "      3  liver         background  1,234.6\n"
       "      3  liver     12  gut             7.0  1,234\n");
 }
 

@@ -194,7 +194,7 @@ std::map<std::int64_t, std::uint64_t> voxels_of(const MeshSummary& mesh) {
   return voxels;
 }
 
-// Of a cube of two halves. Its mesh may be simplified.
+// The samples are a cube of two halves. Simplifying its mesh changes no count.
 TEST_F(LabelJobsTest, CountTheFacesThatTheirSamplesShare) {
   auto samples = test::constant<std::uint8_t>(0, {8, 8, 8});
   for (std::uint32_t k = 1; k < 7; ++k) {

@@ -123,7 +123,7 @@ void Painter::find_rectangle(const ContourGrid& grid) {
   width_ = size(0, left_);
   height_ = size(1, top_);
   if (planes_.empty()) return;
-  // As slice() finds them, of the two slices next to the grid.
+  // slice() draws by the same rule. It would draw in the two slices next to the grid.
   const double half = usual_ / 2;
   if (planes_.front().place + 1 <= half + kPlaceTolerance) is_cut_ = true;
   if (grid.dims[2] - planes_.back().place < half - kPlaceTolerance) is_cut_ = true;

@@ -322,7 +322,7 @@ TEST(DicomStructures, TellThatTheGridCutsThem) {
 }
 
 TEST(DicomStructures, TellNothingOfACutThatLeavesNoSampleOut) {
-  // Up to less than a sample beyond the outermost ones, and to the first and the last slice.
+  // The contours end less than a sample beyond the outermost ones, in all slices.
   const Outcome outcome = imported(draw(
       {{.number = 1, .contours = boxes(-0.9, -0.5, 19.5, 15.9, {0, 2, 4, 6, 8, 10, 12, 14})}}));
   EXPECT_EQ(note_detail(outcome, NoteCode::kContoursSkipped), "");
@@ -343,7 +343,7 @@ TEST(DicomStructures, BeyondTheGridOrOnOtherPlanesAreOfferedAGridOfTheirOwn) {
   const std::vector<TestStructure> tilted = {{.contours = sagittal}};
   EXPECT_THAT(draw(tilted).error, HasSubstr("Add spacing=X,Y,Z (mm), such as 1,1,1.5, to draw"));
   EXPECT_EQ(voxels_of(imported(draw_alone(structure_set(tilted), {1, 1, 1.5})), 1), 6U * 8 * 3);
-  // Between all samples of the grid that was asked for.
+  // The triangle lies between all samples of the grid that was asked for.
   const Points triangle = {{4.2, 4.4, 2}, {4.3, 4.2, 2}, {4.4, 4.4, 2}};
   const std::vector<TestStructure> small = {{.contours = {{triangle}}}};
   EXPECT_THAT(draw_alone(structure_set(small), {1, 1, 2}).error,
