@@ -379,6 +379,7 @@ CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes
 template <class T>
 bool is_mask(const Lattice<T>& lattice, const Context& context) {
   const std::span all(lattice.samples, lattice.dims.samples());
+  if (all.empty()) return false;
   const T one = all.front();
   const auto found = std::ranges::find_if(all, [one](T sample) { return sample != one; });
   if (found == all.end()) return false;

@@ -424,6 +424,7 @@ TEST(IsMask, TellsTwoValuesFromOneAndThree) {
   EXPECT_TRUE(tells({0, 255}));
   EXPECT_TRUE(tells({-7, 3}));
   EXPECT_FALSE(tells({4}));
+  EXPECT_FALSE(is_mask(Lattice<std::int16_t>(), {}));
   EXPECT_FALSE(tells({0, 1, 2}));
   auto volume = test::constant<std::int16_t>(0, {30, 40, 50});
   volume.samples[59'000] = 1;
