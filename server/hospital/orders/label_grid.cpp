@@ -96,13 +96,19 @@ class SliceReader {
     if (samples_->read_at(volume::kHeaderBytes + first * row_bytes, rows_) != rows_.size()) {
       throw Error(ErrorCode::kInternal, "a stored label volume became shorter");
     }
+    with_sample(grid_.type, [&](auto sample) { put_rows<decltype(sample)>(ranges, z); });
+  }
+
+  template <class Sample>
+  void put_rows(const std::array<Range, 3>& ranges, std::uint32_t z) {
     const std::byte* row = rows_.data();
-    for (std::uint32_t y = ranges[1].begin; y < ranges[1].end; ++y, row += row_bytes) {
+    for (std::uint32_t y = ranges[1].begin; y < ranges[1].end; ++y) {
       const std::size_t rest = place_along(1, y) + place_along(2, z);
       for (std::uint32_t x = ranges[0].begin; x < ranges[0].end; ++x) {
-        std::memcpy(window_.data() + sample_bytes_ * (place_along(0, x) + rest),
-                    row + sample_bytes_ * x, sample_bytes_);
+        std::memcpy(window_.data() + sizeof(Sample) * (place_along(0, x) + rest),
+                    row + sizeof(Sample) * x, sizeof(Sample));
       }
+      row += sizeof(Sample) * stored_dims_[0];
     }
   }
 
