@@ -169,6 +169,7 @@ class Union {
       CanonicalWriter writer(task_.target, {volume_.dims, type, volume_.geometry});
       Combinations numbered = combinations_;
       if (!write(numbered, writer.samples())) continue;
+      numbered.sort_values(type, writer.samples());
       volume_.labels = numbered.entries(std::move(entries_));
       if (auto note = numbered.note()) volume_.notes.push_back(std::move(*note));
       return finish(writer, std::move(volume_));

@@ -12,10 +12,10 @@ namespace {
 
 constexpr std::size_t kMostSliceBytes = std::size_t{64} << 20;
 // Samples along each side of a tile, which stays in the first cache.
-constexpr std::size_t kTile = 64;
+constexpr std::size_t kTileSide = 64;
 
 // An axis whose samples are still to be reversed, or not.
-struct Axis {
+struct Side {
   std::size_t number = 0;  // of the present axes
   std::size_t size = 0;
   bool is_reversed = false;
@@ -30,7 +30,7 @@ void copy_reversed(const Sample* from, std::size_t count, Sample* to) {
 
 // Exchanges the axes of a matrix whose elements are `unit` samples, in place.
 template <class Sample>
-void exchange_in_place(Sample* samples, std::size_t unit, const Axis& fast, const Axis& slow) {
+void exchange_in_place(Sample* samples, std::size_t unit, const Side& fast, const Side& slow) {
   const auto source_of = [&](std::size_t place) {
     return fast.place(place / slow.size) + slow.place(place % slow.size) * fast.size;
   };
@@ -54,35 +54,36 @@ void exchange_in_place(Sample* samples, std::size_t unit, const Axis& fast, cons
 constexpr std::size_t kVectorBytes = 16;  // that every processor has
 // Samples along each side of a square block, whose rows are vectors.
 template <class Sample>
-constexpr std::size_t kBlock = kVectorBytes / sizeof(Sample);
+constexpr std::size_t kSquare = kVectorBytes / sizeof(Sample);
 template <class Sample>
-struct Vector {
+struct VectorType {
   using Type [[gnu::vector_size(kVectorBytes)]] = Sample;
 };
 template <class Sample>
-using Row = typename Vector<Sample>::Type;
+using VectorOf = typename VectorType<Sample>::Type;
 
 // The samples of two vectors in turn: those of the first halves, or of the second.
 template <class Sample, std::size_t First, std::size_t... At>
-Row<Sample> in_turn(Row<Sample> one, Row<Sample> other, std::index_sequence<At...>) {
+VectorOf<Sample> alternated(VectorOf<Sample> one, VectorOf<Sample> other,
+                            std::index_sequence<At...>) {
   return __builtin_shufflevector(
-      one, other, (At % 2 == 0 ? First + At / 2 : kBlock<Sample> + First + At / 2)...);
+      one, other, (At % 2 == 0 ? First + At / 2 : kSquare<Sample> + First + At / 2)...);
 }
 
 // Exchanges the axes of a block: each round shuffles its rows as the halves of a deck of cards.
 template <class Sample, class Source, class Target>
 void exchange_block(const Source& source, const Target& target) {
-  constexpr std::size_t kRows = kBlock<Sample>;
+  constexpr std::size_t kRows = kSquare<Sample>;
   constexpr std::make_index_sequence<kRows> kAll;
-  std::array<Row<Sample>, kRows> rows;
-  std::array<Row<Sample>, kRows> next;
+  std::array<VectorOf<Sample>, kRows> rows;
+  std::array<VectorOf<Sample>, kRows> next;
   for (std::size_t at = 0; at < kRows; ++at) std::memcpy(&rows[at], source(at), kVectorBytes);
   for (std::size_t round = 1; round < kRows; round *= 2) {
     for (std::size_t at = 0; at < kRows / 2; ++at) {
       const auto one = rows[at];
       const auto other = rows[at + kRows / 2];
-      next[2 * at] = in_turn<Sample, 0>(one, other, kAll);
-      next[2 * at + 1] = in_turn<Sample, kRows / 2>(one, other, kAll);
+      next[2 * at] = alternated<Sample, 0>(one, other, kAll);
+      next[2 * at + 1] = alternated<Sample, kRows / 2>(one, other, kAll);
     }
     rows = next;
   }
@@ -91,7 +92,7 @@ void exchange_block(const Source& source, const Target& target) {
 
 // A part of a slice: so many samples from `near` along its fast axis, and from `far` along the slow
 // one, as they are numbered afterwards.
-struct Part {
+struct SlicePart {
   std::size_t near = 0;
   std::size_t far = 0;
   std::size_t rows = 0;
@@ -99,9 +100,9 @@ struct Part {
 };
 
 template <class Sample>
-void exchange_part(const Sample* from, const Axis& fast, const Axis& slow, const Part& part,
+void exchange_part(const Sample* from, const Side& fast, const Side& slow, const SlicePart& part,
                    Sample* to) {
-  constexpr std::size_t kSide = kBlock<Sample>;
+  constexpr std::size_t kSide = kSquare<Sample>;
   const std::size_t first = fast.is_reversed ? fast.size - part.near - part.rows : part.near;
   const auto source = [&](std::size_t column) {
     return from + slow.place(part.far + column) * fast.size + first;
@@ -128,12 +129,13 @@ void exchange_part(const Sample* from, const Axis& fast, const Axis& slow, const
 
 // Exchanges the axes of a slice, from one place to another.
 template <class Sample>
-void exchange(const Sample* from, const Axis& fast, const Axis& slow, Sample* to) {
-  for (std::size_t near = 0; near < fast.size; near += kTile) {
-    for (std::size_t far = 0; far < slow.size; far += kTile) {
+void exchange(const Sample* from, const Side& fast, const Side& slow, Sample* to) {
+  for (std::size_t near = 0; near < fast.size; near += kTileSide) {
+    for (std::size_t far = 0; far < slow.size; far += kTileSide) {
       exchange_part(
           from, fast, slow,
-          {near, far, std::min(kTile, fast.size - near), std::min(kTile, slow.size - far)}, to);
+          {near, far, std::min(kTileSide, fast.size - near), std::min(kTileSide, slow.size - far)},
+          to);
     }
   }
 }
@@ -183,7 +185,7 @@ class Turn {
     exchanged(axes_[1], axes_[2]);
   }
 
-  static void exchanged(Axis& one, Axis& other) {
+  static void exchanged(Side& one, Side& other) {
     std::swap(one, other);
     one.is_reversed = other.is_reversed = false;
   }
@@ -216,7 +218,7 @@ class Turn {
   }
 
   Sample* samples_;
-  std::array<Axis, 3> axes_;
+  std::array<Side, 3> axes_;
 };
 
 }  // namespace
