@@ -55,14 +55,15 @@ void choose_structure(const ImportOptions& options, StructureSet& set) {
                std::move(choices));
 }
 
-std::string in_mm(double length) {
+std::string length_text(double length) {
   constexpr double kPerMm = 1000;
   return to_text(length * kPerMm < 1 ? length : std::round(length * kPerMm) / kPerMm);
 }
 
 [[noreturn]] void throw_no_grid(const StructureSet& set) {
   const auto distance = usual_distance(set);
-  const std::string planes = distance ? " Its contours are " + in_mm(*distance) + " mm apart." : "";
+  const std::string planes =
+      distance ? " Its contours are " + length_text(*distance) + " mm apart." : "";
   throw_unusable(
       "The DICOM structure set has no images in the upload that share its frame of reference. Add "
       "them, or add spacing=X,Y,Z (mm) for the grid on which its contours are drawn." +
@@ -84,12 +85,12 @@ ContourGrid grid_of(const StructureSet& set, const std::optional<ContourGrid>& i
 }
 
 // How to draw what the grid leaves out. The set still has its points.
-std::string way_out(const StructureSet& set, const ContourGrid& grid,
-                    const ImportOptions& options) {
+std::string spacing_to_add(const StructureSet& set, const ContourGrid& grid,
+                           const ImportOptions& options) {
   if (options.spacing) return "A smaller spacing=X,Y,Z (mm) draws smaller structures.";
   const auto& [x, y, z] = grid.geometry.spacing;
-  return "Add spacing=X,Y,Z (mm), such as " + in_mm(x) + ',' + in_mm(y) + ',' +
-         in_mm(usual_distance(set).value_or(z)) +
+  return "Add spacing=X,Y,Z (mm), such as " + length_text(x) + ',' + length_text(y) + ',' +
+         length_text(usual_distance(set).value_or(z)) +
          ", to draw on a grid of its own, around all contours and parallel to their planes.";
 }
 
@@ -176,7 +177,7 @@ std::vector<LabelEntry> entries_of(const StructureSet& set, const std::set<std::
 }
 
 // "1, 2 and 3 more".
-std::string in_words(const std::vector<std::uint32_t>& labels) {
+std::string listed_labels(const std::vector<std::uint32_t>& labels) {
   constexpr std::size_t kMostNamed = 10;
   std::string text;
   const std::size_t named = std::min(labels.size(), kMostNamed);
@@ -186,7 +187,7 @@ std::string in_words(const std::vector<std::uint32_t>& labels) {
 }
 
 // Names stay out, because meshes carry these notes.
-void add_notes(const StructureSet& set, const Drawing& drawing, const std::string& way_out,
+void add_notes(const StructureSet& set, const Drawing& drawing, const std::string& remedy,
                Volume& volume) {
   const std::vector<std::uint32_t> cut = drawing.cut();
   const std::size_t tilted = drawing.sum(&Painter::tilted);
@@ -201,10 +202,10 @@ void add_notes(const StructureSet& set, const Drawing& drawing, const std::strin
   add(lost, "structure", "with no sample on the grid");
   add(cut.size(), "structure",
       "where the grid ends before the contours do (" +
-          std::string(cut.size() == 1 ? "label " : "labels ") + in_words(cut) + ')');
+          std::string(cut.size() == 1 ? "label " : "labels ") + listed_labels(cut) + ')');
   if (!skipped.empty()) {
     std::string detail = "Not drawn: " + skipped + '.';
-    if (tilted > 0 || lost > 0 || !cut.empty()) detail += ' ' + way_out;
+    if (tilted > 0 || lost > 0 || !cut.empty()) detail += ' ' + remedy;
     volume.notes.push_back(note_of(NoteCode::kContoursSkipped, std::move(detail)));
   }
   if (const std::size_t count = drawing.sum(&Painter::interpolated); count > 0) {
@@ -248,7 +249,7 @@ Volume import_structures(const std::filesystem::path& path,
   const ContourGrid grid = grid_of(set, images, task.options);
   Volume volume = describe(grid, file.data());
   check_limits(volume.sample_count(), SampleType::kUint8, task.limits);
-  const std::string remedy = way_out(set, grid, task.options);
+  const std::string remedy = spacing_to_add(set, grid, task.options);
   Drawing drawing(set, grid);
   for (const SampleType type : drawing.types()) {
     check_limits(volume.sample_count(), type, task.limits);
