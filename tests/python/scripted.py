@@ -26,22 +26,31 @@ def volume():
     }
 
 
+FILE = {"bytes": len(MESH), "sha256": hashlib.sha256(MESH).hexdigest(), "href": "/v1/jobs/1/mesh.stl"}
+
+
 def job():
-    """A job that has succeeded."""
-    file = {"bytes": len(MESH), "sha256": hashlib.sha256(MESH).hexdigest(), "href": "/v1/jobs/1/mesh.stl"}
+    """A job that has succeeded, with the members that Python needs."""
     return {
         "id": "1", "state": "succeeded", "volume": VOLUME, "parameters": {"volume": VOLUME, "iso": 1.0}, "error": None,
-        "mesh": {"empty": False, "files": {"stl": file}, "dropped": {"components": 0}},
+        "mesh": {"empty": False, "files": {"stl": FILE}},
     }
+
+
+def problem(status):
+    fault = {"type": "about:blank", "title": "No", "status": status, "detail": "so says the script", "instance": "/"}
+    return json.dumps(fault).encode()
 
 
 class ScriptedServer:
     """Stores one volume in parts, and makes a mesh at once. `script` names what happens to the first requests of a method instead: a
     status with headers, in which OWN is the server's own address, or one of the words above. `calls` has each request with what it
     got, such as "PATCH 201". Parts of a body that are not its last are left out, because only some clients send any.
+    `job` is what becomes of the volume's job, and `failing` has the status of paths that are not there or fail.
     """
 
-    def __init__(self, script):
+    def __init__(self, script, job=None, failing=None, notes=()):
+        self.job, self.failing, self.notes = job, failing or {}, list(notes)
         self.script = {method: list(steps) for method, steps in script.items()}
         self.calls, self.bytes, self.is_whole = [], b"", False
         self.silent = threading.Event()  # somebody waits for a response
@@ -102,9 +111,8 @@ class ScriptedServer:
             request.rfile.read(size)
             if step == 503:
                 self.silent.set()
-            problem = json.dumps({"title": "No", "status": step, "detail": "so says the script"}).encode()
             told = {name: text.replace("OWN", self.url) for name, text in headers.items()}
-            self.answer(request, step, {"Content-Type": PROBLEM, **told}, b"" if request.command == "HEAD" else problem)
+            self.answer(request, step, {"Content-Type": PROBLEM, **told}, b"" if request.command == "HEAD" else problem(step))
 
     def cut(self, request, step):
         self.calls.append(f"{request.command} {step}")
@@ -120,7 +128,9 @@ class ScriptedServer:
         """Status, headers and body of the API's response."""
         path, _, query = request.path.partition("?")
         state = {"Upload-Offset": str(len(self.bytes)), "Upload-Complete": "?1" if self.is_whole else "?0"}
-        stored = json.dumps({**volume(), "bytes": len(self.bytes)}).encode()
+        stored = json.dumps({**volume(), "bytes": len(self.bytes), "notes": self.notes}).encode()
+        if path in self.failing:
+            return self.failing[path], {"Content-Type": PROBLEM}, problem(self.failing[path])
         if request.command == "HEAD":
             return 204, state, b""
         if request.command == "DELETE":
@@ -135,9 +145,11 @@ class ScriptedServer:
         if path == "/v1/volumes":
             self.bytes, self.is_whole = body, True
             return 201, {}, stored
+        if path.startswith("/v1/volumes/"):
+            return 200, {}, stored
         if path.endswith("/mesh.stl"):
             return 200, {}, MESH
-        return 200, {}, json.dumps(job()).encode()
+        return 200, {}, json.dumps(self.job or job()).encode()
 
     def answer(self, request, status, headers, content):
         if status != 204 or request.command != "PATCH":

@@ -17,8 +17,8 @@ import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from scripted import CUT, HALF, LOST, SILENT, UPLOAD, VOLUME, ScriptedServer
-from support import DAEMON, DaemonTest
+from scripted import CUT, FILE, HALF, LOST, MESH, SILENT, UPLOAD, VOLUME, ScriptedServer
+from support import DAEMON, DaemonTest, ball
 
 CONTENT = bytes(range(251)) * (9 << 12)  # is sent in parts
 PYTHON = """
@@ -40,6 +40,69 @@ try {
   process.exitCode = 1;
 }
 """
+
+
+MESH_PYTHON = """
+import sys, isomesh_client
+server, file, target, allow_empty = sys.argv[1:]
+client = isomesh_client.Client(server)
+try:
+    for result in client.mesh_all([file], to=lambda _: target, iso=1, allow_empty=allow_empty == "true"):
+        if result.error: raise result.error
+except isomesh_client.IsomeshError as error:
+    sys.exit(str(error))
+"""
+MESH_JAVASCRIPT = """
+import { readFile, writeFile } from 'node:fs/promises';
+import { Client } from './client.mjs';
+const [server, file, target, allowEmpty] = process.argv.slice(2);
+const client = new Client({ server });
+try {
+  const { volumes } = await client.upload(await readFile(file), { name: 'head.nii' });
+  for (const { code, detail } of volumes[0].volume.notes) console.error(detail, code);
+  const { id } = await client.submitJob({ volume: volumes[0].volume.id, iso: 1, formats: ['stl'] });
+  const job = await client.follow(id);
+  if (job.state !== 'succeeded') throw new Error(job.error?.detail ?? job.state);
+  await writeFile(target, new Uint8Array(await client.meshOf(job, 'stl', undefined, { allowEmpty: allowEmpty === 'true' })));
+} catch (error) {
+  console.error(error.message);
+  process.exitCode = 1;
+}
+// The stream of events may still be open.
+process.exit();
+"""
+
+
+@dataclass
+class Ending:
+    """What becomes of a job, and what each client says of it. A client that fails leaves no file."""
+
+    says: str = "^"
+    job: dict = field(default_factory=dict)  # members that differ from those of a job that succeeds
+    mesh: dict = field(default_factory=dict)  # the same of its mesh
+    failing: dict = None
+    notes: tuple = ()
+    allow_empty: bool = False
+    succeeds: bool = False
+
+
+FAULT = {"type": "urn:isomesh:problem:too-large", "title": "Too large", "status": 413, "detail": "so says the script", "instance": "/v1/jobs/1"}
+EMPTY = {"empty": True, "empty_reason": "so says the script"}
+NOTE = {"code": "forms-differ", "detail": "so says the script"}
+ENDINGS = {
+    "well": Ending(succeeds=True),
+    "a volume with a note": Ending("so says the script.*forms-differ", notes=(NOTE,), succeeds=True),
+    "an empty surface": Ending("[Tt]he surface is empty: so says the script", mesh=EMPTY),
+    "an empty surface that is allowed": Ending(mesh=EMPTY, allow_empty=True, succeeds=True),
+    "an empty surface of an older server": Ending("[Tt]he surface is empty", mesh={"empty": True}),
+    "a job that fails": Ending("so says the script", {"state": "failed", "mesh": None, "error": FAULT}),
+    "a job that was cancelled": Ending("cancelled", {"state": "cancelled", "mesh": None}),
+    "parameters that are rejected": Ending("so says the script", failing={"/v1/jobs": 422}),
+    "a volume that is rejected": Ending("so says the script", failing={"/v1/volumes": 422}),
+    "a mesh that has expired": Ending("so says the script", failing={"/v1/jobs/1/mesh.stl": 410}),
+    "a job that has expired": Ending("so says the script", failing={"/v1/jobs/1": 410, "/v1/jobs/1/mesh.stl": 410}),
+    "a mesh that cannot be read": Ending("so says the script", failing={"/v1/jobs/1/mesh.stl": 500}),
+}
 
 
 @dataclass
@@ -122,12 +185,16 @@ class Clients(DaemonTest):
     def prepare(cls, folder):
         (folder / "head.nii").write_bytes(CONTENT)
         (folder / "upload.mjs").write_text(JAVASCRIPT)
+        (folder / "mesh.mjs").write_text(MESH_JAVASCRIPT)
+        (folder / "few.nii").write_bytes(CONTENT[:1000])
 
     @classmethod
     def start(cls):
         super().start()
         with urllib.request.urlopen(f"{cls.url}/client.js") as response:
             (cls.folder / "client.mjs").write_bytes(response.read())
+        # With all members, which the command needs.
+        cls.job = cls.client.mesh(ball(), iso=-8, formats=["stl"]).job
 
     def run_client(self, command, case):
         """The exit status and the output of a client, with the server that it talked to."""
@@ -167,6 +234,49 @@ class Clients(DaemonTest):
                 if case.succeeds:
                     self.assertIn(VOLUME, out)
                     self.assertTrue(server.bytes == CONTENT)
+
+    def assert_endings(self, command_of):
+        """`command_of`: the command line for a server, the file to write and if it may be without triangles."""
+        for name, ending in ENDINGS.items():
+            mesh = {**self.job["mesh"], "files": {"stl": FILE}, **ending.mesh}
+            job = {**self.job, "id": "1", "volume": VOLUME, "mesh": mesh, **ending.job}
+            target = self.folder / "mesh.stl"
+            earlier = b"an earlier mesh"
+            for is_there in (False, True):
+                with self.subTest(name, is_there=is_there):
+                    target.unlink(missing_ok=True)
+                    if is_there:
+                        target.write_bytes(earlier)
+                    with ScriptedServer({}, job, ending.failing, ending.notes) as server:
+                        ran = subprocess.run(
+                            command_of(server.url, target, ending.allow_empty),
+                            cwd=self.folder, check=False, capture_output=True, text=True, timeout=30,
+                        )
+                    self.assertEqual(ran.returncode, 0 if ending.succeeds else 1, ran.stderr)
+                    self.assertRegex(ran.stderr, ending.says)
+                    self.assertNotIn("Traceback", ran.stderr)
+                    found = target.read_bytes() if target.exists() else None
+                    self.assertEqual(found, MESH if ending.succeeds else earlier if is_there else None)
+                    self.assertEqual([each for each in os.listdir(self.folder) if each.endswith(".part")], [])
+
+    def test_endings_of_a_job_with_the_command(self):
+        def command(server, target, allow_empty):
+            options = ["--allow-empty"] if allow_empty else []
+            return [DAEMON.with_name("isomesh"), "--server", server, "mesh", "few.nii", "--iso", "1", *options, "-o", target]
+
+        self.assert_endings(command)
+
+    def test_endings_of_a_job_with_the_python_package(self):
+        def command(server, target, allow_empty):
+            return [sys.executable, "-c", MESH_PYTHON, server, "few.nii", target, str(allow_empty).lower()]
+
+        self.assert_endings(command)
+
+    def test_endings_of_a_job_with_the_javascript_module(self):
+        def command(server, target, allow_empty):
+            return [shutil.which("node"), "mesh.mjs", server, "few.nii", target, str(allow_empty).lower()]
+
+        self.assert_endings(command)
 
     def test_the_command(self):
         self.assert_table([DAEMON.with_name("isomesh"), "--server", "SERVER", "upload", "head.nii"])
