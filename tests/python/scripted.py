@@ -26,23 +26,20 @@ def volume():
     }
 
 
-def job(**changed):
-    """A job that has succeeded, with other members."""
-    file = {"bytes": len(MESH), "sha256": hashlib.sha256(MESH).hexdigest(), "href": "/v1/jobs/1/mesh.stl"}
+FILE = {"bytes": len(MESH), "sha256": hashlib.sha256(MESH).hexdigest(), "href": "/v1/jobs/1/mesh.stl"}
+
+
+def job():
+    """A job that has succeeded, with the members that Python needs."""
     return {
         "id": "1", "state": "succeeded", "volume": VOLUME, "parameters": {"volume": VOLUME, "iso": 1.0}, "error": None,
-        "mesh": {"empty": False, "files": {"stl": file}, "dropped": {"components": 0}}, **changed,
+        "mesh": {"empty": False, "files": {"stl": FILE}},
     }
 
 
-def empty_job():
-    """A job that has succeeded without a surface."""
-    mesh = job()["mesh"]
-    return job(mesh={**mesh, "empty": True, "empty_reason": "so says the script"})
-
-
 def problem(status):
-    return json.dumps({"type": "about:blank", "title": "No", "status": status, "detail": "so says the script"}).encode()
+    fault = {"type": "about:blank", "title": "No", "status": status, "detail": "so says the script", "instance": "/"}
+    return json.dumps(fault).encode()
 
 
 class ScriptedServer:
@@ -148,6 +145,8 @@ class ScriptedServer:
         if path == "/v1/volumes":
             self.bytes, self.is_whole = body, True
             return 201, {}, stored
+        if path.startswith("/v1/volumes/"):
+            return 200, {}, stored
         if path.endswith("/mesh.stl"):
             return 200, {}, MESH
         return 200, {}, json.dumps(self.job or job()).encode()

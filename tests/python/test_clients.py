@@ -17,8 +17,8 @@ import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from scripted import CUT, HALF, LOST, MESH, SILENT, UPLOAD, VOLUME, ScriptedServer, empty_job, job
-from support import DAEMON, DaemonTest
+from scripted import CUT, FILE, HALF, LOST, MESH, SILENT, UPLOAD, VOLUME, ScriptedServer
+from support import DAEMON, DaemonTest, ball
 
 CONTENT = bytes(range(251)) * (9 << 12)  # is sent in parts
 PYTHON = """
@@ -78,23 +78,25 @@ class Ending:
     """What becomes of a job, and what each client says of it. A client that fails leaves no file."""
 
     says: str = "^"
-    job: dict = None
+    job: dict = field(default_factory=dict)  # members that differ from those of a job that succeeds
+    mesh: dict = field(default_factory=dict)  # the same of its mesh
     failing: dict = None
     notes: tuple = ()
     allow_empty: bool = False
     succeeds: bool = False
 
 
-FAULT = {"type": "urn:isomesh:problem:too-large", "title": "Too large", "status": 413, "detail": "so says the script"}
+FAULT = {"type": "urn:isomesh:problem:too-large", "title": "Too large", "status": 413, "detail": "so says the script", "instance": "/v1/jobs/1"}
+EMPTY = {"empty": True, "empty_reason": "so says the script"}
 NOTE = {"code": "forms-differ", "detail": "so says the script"}
 ENDINGS = {
     "well": Ending(succeeds=True),
     "a volume with a note": Ending("so says the script.*forms-differ", notes=(NOTE,), succeeds=True),
-    "an empty surface": Ending("[Tt]he surface is empty: so says the script", empty_job()),
-    "an empty surface that is allowed": Ending(job=empty_job(), allow_empty=True, succeeds=True),
-    "an empty surface of an older server": Ending("[Tt]he surface is empty", job(mesh={**job()["mesh"], "empty": True})),
-    "a job that fails": Ending("so says the script", job(state="failed", mesh=None, error=FAULT)),
-    "a job that was cancelled": Ending("cancelled", job(state="cancelled", mesh=None)),
+    "an empty surface": Ending("[Tt]he surface is empty: so says the script", mesh=EMPTY),
+    "an empty surface that is allowed": Ending(mesh=EMPTY, allow_empty=True, succeeds=True),
+    "an empty surface of an older server": Ending("[Tt]he surface is empty", mesh={"empty": True}),
+    "a job that fails": Ending("so says the script", {"state": "failed", "mesh": None, "error": FAULT}),
+    "a job that was cancelled": Ending("cancelled", {"state": "cancelled", "mesh": None}),
     "parameters that are rejected": Ending("so says the script", failing={"/v1/jobs": 422}),
     "a volume that is rejected": Ending("so says the script", failing={"/v1/volumes": 422}),
     "a mesh that has expired": Ending("so says the script", failing={"/v1/jobs/1/mesh.stl": 410}),
@@ -191,6 +193,8 @@ class Clients(DaemonTest):
         super().start()
         with urllib.request.urlopen(f"{cls.url}/client.js") as response:
             (cls.folder / "client.mjs").write_bytes(response.read())
+        # With all members, which the command needs.
+        cls.job = cls.client.mesh(ball(), iso=-8, formats=["stl"]).job
 
     def run_client(self, command, case):
         """The exit status and the output of a client, with the server that it talked to."""
@@ -234,6 +238,8 @@ class Clients(DaemonTest):
     def assert_endings(self, command_of):
         """`command_of`: the command line for a server, the file to write and if it may be without triangles."""
         for name, ending in ENDINGS.items():
+            mesh = {**self.job["mesh"], "files": {"stl": FILE}, **ending.mesh}
+            job = {**self.job, "id": "1", "volume": VOLUME, "mesh": mesh, **ending.job}
             target = self.folder / "mesh.stl"
             earlier = b"an earlier mesh"
             for is_there in (False, True):
@@ -241,7 +247,7 @@ class Clients(DaemonTest):
                     target.unlink(missing_ok=True)
                     if is_there:
                         target.write_bytes(earlier)
-                    with ScriptedServer({}, ending.job, ending.failing, ending.notes) as server:
+                    with ScriptedServer({}, job, ending.failing, ending.notes) as server:
                         ran = subprocess.run(
                             command_of(server.url, target, ending.allow_empty),
                             cwd=self.folder, check=False, capture_output=True, text=True, timeout=30,
