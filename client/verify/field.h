@@ -40,6 +40,10 @@ struct Cut {
   bool midpoint = false;  // only the sign of the field counts
 };
 
+// For a surface around lower values: makes the field and the iso-value negative, so that what was
+// below it is inside.
+void turn_over(Cut& cut, Field& field);
+
 // The set where the field is `iso`, linear in each tetrahedron. Triangles face lower values; some
 // have no area, where a sample has that value or the surface is closed.
 Surface zero_set(const Field& field, const Cut& cut);

@@ -28,6 +28,7 @@ struct Arguments {
   verify::Cut cut;
   verify::Question question;
   std::vector<double> crop;
+  std::string inside = "above";
 };
 
 void add_options(CLI::App& app, Arguments& all) {
@@ -40,6 +41,8 @@ void add_options(CLI::App& app, Arguments& all) {
   add("--bound", all.question.bound, "MM", "The distance, such as the job's --max-error")
       ->required();
   add("--scheme", all.cut.tetrahedra, "5|6", "As in the job")->check(CLI::IsMember({5, 6}));
+  add("--inside", all.inside, "above|below", "As in the job")
+      ->check(CLI::IsMember({"above", "below"}));
   add("--crop", all.crop, "X,Y,Z,X,Y,Z", "As in the job; closes")->delimiter(',')->expected(6);
   app.add_flag("--close", all.cut.close, "The job closed the surface at the volume's border");
   app.add_flag("--midpoint", all.cut.midpoint, "The job had --interpolation midpoint");
@@ -68,6 +71,7 @@ int run(Arguments& all) {
                            verify::Vec{all.crop[3], all.crop[4], all.crop[5]}});
     cut.close = true;
   }
+  if (all.inside == "below") verify::turn_over(cut, field);
   all.question.is_closed = cut.close;
   verify::Surface surface = verify::zero_set(field, cut);
   const verify::Verdict verdict = verify::verify(mesh, surface, field, all.question);

@@ -67,6 +67,7 @@ verify::Verdict verdict(verify::Surface mesh, const SampleVolume<float>& volume,
   cut.tetrahedra = parameters.scheme == SchemeName::kFive ? 5 : 6;
   cut.close = parameters.close;
   cut.midpoint = parameters.interpolation == Interpolation::kMidpoint;
+  if (parameters.inside == Inside::kBelow) verify::turn_over(cut, field);
   verify::Surface surface = verify::zero_set(field, cut);
   verify::Question question;
   question.bound = parameters.max_error_mm.value_or(0.001);
