@@ -116,6 +116,13 @@ struct LabelFile {
   bool operator==(const LabelFile&) const = default;
 };
 
+// True if a surface encloses the volume that the sum over its triangles gives. An open surface
+// encloses nothing, and its sum is no volume. One that is inside out has a negative sum: it is the
+// wall of a hollow in something larger.
+constexpr bool encloses(bool closed, bool oriented, double volume_mm3) {
+  return closed && oriented && volume_mm3 >= 0;
+}
+
 // One label of a finished job: its samples, and its own surface after smoothing. A wall between two
 // labels belongs to both surfaces.
 struct LabelSummary {
@@ -134,8 +141,7 @@ struct LabelSummary {
   double volume_mm3 = 0;  // enclosed by the surface, see encloses_volume()
   std::map<MeshFormat, LabelFile> files = {};
 
-  // An open surface encloses nothing: the sum over its triangles is no volume.
-  bool encloses_volume() const { return closed && oriented; }
+  bool encloses_volume() const { return encloses(closed, oriented, volume_mm3); }
 
   bool operator==(const LabelSummary&) const = default;
 };
@@ -200,7 +206,7 @@ struct MeshQuality {
   Stages aspect_ratio;                // 2 * inradius / circumradius: 1 is equilateral; bins of 0.05
   Stages smallest_angle_deg;          // of each triangle: 60 is equilateral; bins of 3 degrees
   // True if the volumes are those that the surface encloses. The volumes of an open surface depend
-  // on the origin of the sum and are meaningless.
+  // on the origin of the sum and are meaningless, and those of one that is inside out are negative.
   bool encloses_volume = false;
   std::optional<SelfIntersections> self_intersections = {};  // only if the job is certified
 

@@ -119,7 +119,8 @@ constinit const Parameter kIso = {
         "The iso-value in the volume's units, `otsu` for Otsu's threshold, or the name of one of "
         "the volume's presets.",
     .more =
-        "A sample is inside when its value is >= iso. A CT in Hounsfield units has `skin`, "
+        "A sample is inside when its value is >= iso; see `inside`. A CT in Hounsfield units has "
+        "`skin`, "
         "`soft-tissue` and `bone`, a fractional segmentation has `segment`, if the value occurs "
         "in it. The job then has the preset's number.",
     .when_empty = "otsu",
@@ -127,6 +128,18 @@ constinit const Parameter kIso = {
     .is_required = true,
     .unless = "labels",
     .jobs = JobKind::kAtIso,
+    .may_be_absent = true};
+
+constinit const Parameter kInside = {
+    .name = "inside",
+    .title = "Inside",
+    .help = "The samples inside the surface: those of at least the iso-value, or those below it.",
+    .more =
+        "`below` is for dark structures, such as airways, ventricles and cysts. Samples beyond the "
+        "volume's border are never inside. Padding and NaN have the value of the smallest sample.",
+    .values = {"Bright structures", "Dark structures"},
+    .jobs = JobKind::kAtIso,
+    .by_labels = "must be \"above\" for labels: none of their values is below another",
     .may_be_absent = true};
 
 constinit const Parameter kLabels = {
@@ -182,9 +195,8 @@ constinit const Parameter kLabelValues = {
     .help = "The labels of the volume that each label joins, for labels that join several.",
     .more =
         "A label of the volume may be in several lists; these labels then overlap there. In a "
-        "list, "
-        "it is no longer a label itself, unless it has a list, too. The volume's labels are those "
-        "of `GET /v1/volumes/{id}/labels`, also if its samples have other numbers.",
+        "list, it is no longer a label itself, unless it has a list, too. The volume's labels are "
+        "those of `GET /v1/volumes/{id}/labels`, also if its samples have other numbers.",
     .jobs = JobKind::kByLabels,
     .may_be_absent = true,
     .in_query = false,

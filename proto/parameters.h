@@ -34,6 +34,8 @@ constexpr Scheme scheme_of(SchemeName name) {
   return name == SchemeName::kKuhn ? Scheme::kSix : Scheme{static_cast<int>(name)};
 }
 
+// The samples that are inside: those of at least the iso-value, or all others.
+enum class Inside { kAbove, kBelow };
 enum class Interpolation { kLinear, kMidpoint };
 // KHR_draco_mesh_compression, floats as they are, EXT_meshopt_compression, KHR_meshopt_compression,
 // KHR_mesh_quantization.
@@ -78,6 +80,7 @@ struct MeshParameters {
   // Of a request: the preset (presets.h) whose value the server puts into `iso`, which is empty
   // until then. Empty in jobs.
   std::string preset = {};
+  Inside inside = Inside::kAbove;
   SchemeName scheme = SchemeName::kSix;
   Interpolation interpolation = Interpolation::kLinear;
   bool regularize = true;
@@ -164,10 +167,10 @@ double default_lambda(const MeshParameters& parameters);
 namespace rows {
 extern const Parameter kKeep, kMinTriangles, kNearestTo;
 extern const Parameter kPositionBits, kSpeed;
-extern const Parameter kIso, kLabels, kBackground, kLabelNames, kLabelColors, kLabelValues, kScheme,
-    kInterpolation, kRegularize, kPasses, kSmoothing, kLambda, kPassBand, kMaxDisplacementMm,
-    kUntangle, kClose, kComponents, kFillCavities, kCrop, kMaxErrorMm, kTriangles, kFormats, kDraco,
-    kNormals, kDistances, kLods, kMerge, kGlbCodec, kSpace;
+extern const Parameter kIso, kInside, kLabels, kBackground, kLabelNames, kLabelColors, kLabelValues,
+    kScheme, kInterpolation, kRegularize, kPasses, kSmoothing, kLambda, kPassBand,
+    kMaxDisplacementMm, kUntangle, kClose, kComponents, kFillCavities, kCrop, kMaxErrorMm,
+    kTriangles, kFormats, kDraco, kNormals, kDistances, kLods, kMerge, kGlbCodec, kSpace;
 extern const Parameter kVolume, kPriority, kCertify, kMinThicknessMm, kCallback;
 extern const Parameter kLabelName;  // of a member that a label names
 }  // namespace rows
@@ -193,6 +196,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   const bool by_iso = is_told(self, !self.labels);
   const bool by_labels = is_told(self, self.labels.has_value());
   if (by_iso) parameter(rows::kIso, self.iso);
+  if (is_told(self, self.inside != Inside::kAbove)) parameter(rows::kInside, self.inside);
   if (by_labels) {
     parameter(rows::kLabels, self.labels);
     parameter(rows::kBackground, self.background);

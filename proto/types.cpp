@@ -52,6 +52,12 @@ struct Names<SchemeName> {
 };
 
 template <>
+struct Names<Inside> {
+  static constexpr std::array kTable = {std::pair{Inside::kAbove, "above"},
+                                        std::pair{Inside::kBelow, "below"}};
+};
+
+template <>
 struct Names<Interpolation> {
   static constexpr std::array kTable = {std::pair{Interpolation::kLinear, "linear"},
                                         std::pair{Interpolation::kMidpoint, "midpoint"}};
@@ -191,6 +197,7 @@ ISOMESH_NAMED(SampleType)
 ISOMESH_NAMED(SaidModality)
 ISOMESH_NAMED(NiftiForm)
 ISOMESH_NAMED(SchemeName)
+ISOMESH_NAMED(Inside)
 ISOMESH_NAMED(Interpolation)
 ISOMESH_NAMED(Smoothing)
 ISOMESH_NAMED(MeshFormat)

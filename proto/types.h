@@ -281,6 +281,7 @@ std::string_view to_string(SampleType value);
 std::string_view to_string(SaidModality value);
 std::string_view to_string(NiftiForm value);
 std::string_view to_string(SchemeName value);
+std::string_view to_string(Inside value);
 std::string_view to_string(Interpolation value);
 std::string_view to_string(Smoothing value);
 std::string_view to_string(MeshFormat value);

@@ -293,8 +293,9 @@ void MeshRun::report(const Job& job, const std::vector<Output>& outputs, const T
     tell_notes(job.mesh->notes, options_, task.subject);
   } else {
     if (job.reused) text += "\nthe mesh was reused from an identical earlier job\n";
-    text += '\n' + timing_report(job.timing, seen_) + '\n' +
-            mesh_report(*with_labels(client_, job).mesh, unit_of(client_, job));
+    text +=
+        '\n' + timing_report(job.timing, seen_) + '\n' +
+        mesh_report(*with_labels(client_, job).mesh, unit_of(client_, job), job.parameters.inside);
   }
   print(text);
 }

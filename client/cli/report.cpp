@@ -34,7 +34,8 @@ std::string percent(double part, double whole) {
 
 std::string iso_of(const JobParameters& parameters) {
   if (parameters.labels) return "labels";
-  return parameters.iso ? human_number(*parameters.iso) : "otsu";
+  const std::string iso = parameters.iso ? human_number(*parameters.iso) : "otsu";
+  return parameters.inside == Inside::kBelow ? "below " + iso : iso;
 }
 
 std::string subject_of(const JobParameters& parameters) {
@@ -81,14 +82,22 @@ void tell_iso(const MeshSummary& mesh, Rows& rows) {
   if (mesh.iso) rows.push_back({"iso-value", human_number(*mesh.iso)});
 }
 
+// Why a surface encloses no volume.
+std::string why_no_volume(const MeshSummary& mesh, Inside inside) {
+  if (!mesh.quality.closed) return "the surface is open; --close caps it at the volume's border";
+  if (!mesh.quality.oriented) return "the triangles disagree about which side is outside";
+  const std::string way_out =
+      inside == Inside::kAbove
+          ? "it is around samples below the iso-value, which --inside below takes for inside"
+          : "it is around samples of at least the iso-value, which --inside above takes for inside";
+  return "the surface is inside out" + (mesh.iso ? "; " + way_out : "");
+}
+
 // Unless a surface encloses something, the sum over its triangles is not a volume.
-void tell_volume(const MeshSummary& mesh, const Units& in, Rows& rows) {
+void tell_volume(const MeshSummary& mesh, const Units& in, Inside inside, Rows& rows) {
   if (mesh.empty) return;
   if (!mesh.quality.encloses_volume) {
-    rows.push_back(
-        {"volume", mesh.quality.closed
-                       ? "none: the triangles disagree about which side is outside"
-                       : "none: the surface is open; --close caps it at the volume's border"});
+    rows.push_back({"volume", "none: " + why_no_volume(mesh, inside)});
     return;
   }
   const std::string after = mesh.simplified ? " simplified" : " smoothed";
@@ -189,6 +198,7 @@ void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
 std::string labels_report(const std::vector<LabelSummary>& labels, const Units& in) {
   bool are_closed = true;
   bool are_oriented = true;
+  bool are_outward = true;
   Rows rows = {{"label", "name", "triangles", in.cubic(), in.cubic() + " of voxels", "topology"}};
   for (const LabelSummary& label : labels) {
     std::string topology = label.closed ? "closed" : "open";
@@ -199,6 +209,7 @@ std::string labels_report(const std::vector<LabelSummary>& labels, const Units& 
                     fixed(label.voxels_mm3, 1), topology});
     are_closed = are_closed && label.closed;
     are_oriented = are_oriented && (label.oriented || !label.closed);
+    are_outward = are_outward && (label.encloses_volume() || !label.closed || !label.oriented);
   }
   std::string text = in_columns(
       {Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight, Align::kLeft},
@@ -212,6 +223,11 @@ std::string labels_report(const std::vector<LabelSummary>& labels, const Units& 
     text +=
         "\n  A label that is not oriented encloses no volume: its triangles disagree about which "
         "side is outside.\n";
+  }
+  if (!are_outward) {
+    text +=
+        "\n  A closed label without a volume is inside out: it goes on beyond the volume's border, "
+        "and its surface is only around a cavity in it.\n";
   }
   return text;
 }
@@ -238,7 +254,7 @@ std::string timing_report(const Timing& timing, const ClientTiming& client) {
   return in_columns({Align::kLeft, Align::kRight, Align::kRight}, rows);
 }
 
-std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
+std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit, Inside inside) {
   const Units in(unit);
   Rows rows;
   tell_iso(mesh, rows);
@@ -252,7 +268,7 @@ std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
       {"area", in.area(mesh.area_extracted_mm2) + " extracted"},
       {"", in.area(mesh.area_mm2) + (mesh.simplified ? " simplified" : " smoothed")}};
   rows.insert(rows.end(), sizes.begin(), sizes.end());
-  tell_volume(mesh, in, rows);
+  tell_volume(mesh, in, inside, rows);
   const Rows places = {{"displacement", in.length(mesh.displacement_mm.mean, 3) + " on average, " +
                                             in.length(mesh.displacement_mm.max, 3) + " at most"},
                        {"x (LPS)", extent(mesh, 0, in)},
@@ -383,7 +399,7 @@ std::string job_report(const Job& job, const LengthUnit& unit) {
   }
   std::string text = in_columns({Align::kLeft, Align::kLeft}, rows);
   if (is_final(job.state)) text += '\n' + timing_report(job.timing, {});
-  if (job.mesh) text += '\n' + mesh_report(*job.mesh, unit);
+  if (job.mesh) text += '\n' + mesh_report(*job.mesh, unit, job.parameters.inside);
   return text;
 }
 

@@ -29,7 +29,8 @@ inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
 std::string timing_report(const Timing& timing, const ClientTiming& client);
 
 // `unit`: of the job's volume.
-std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit = length_unit({}));
+std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit = length_unit({}),
+                        Inside inside = Inside::kAbove);
 std::string volume_report(const Volume& volume);
 // A line of bars over the range. Heights are logarithms, because air outnumbers everything else.
 std::string histogram_report(const Histogram& histogram);

@@ -42,6 +42,10 @@ struct Cut {
   bool fill = false;      // cavities are filled
 };
 
+// For a surface around lower values: makes the field and the iso-value negative, so that what was
+// below it is inside.
+void turn_over(Cut& cut, Field& field);
+
 // Raises the samples of cavities, and of what floats in them, so that the zero set has no walls
 // there. A cavity is below the iso-value, and no path along edges of tetrahedra leads from it to
 // the border of the volume.

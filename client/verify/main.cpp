@@ -28,6 +28,7 @@ struct Arguments {
   verify::Cut cut;
   verify::Question question;
   std::vector<double> crop;
+  std::string inside = "above";
 };
 
 std::array<double, 3> point_from(const std::string& text) {
@@ -52,6 +53,8 @@ void add_options(CLI::App& app, Arguments& all) {
   add("--iso", all.cut.iso, "VALUE", "The iso-value of the job");
   add("--bound", all.question.bound, "MM", "The distance, such as the job's --max-error");
   add("--scheme", all.cut.tetrahedra, "5|6", "As in the job")->check(CLI::IsMember({5, 6}));
+  add("--inside", all.inside, "above|below", "As in the job")
+      ->check(CLI::IsMember({"above", "below"}));
   add("--crop", all.crop, "X,Y,Z,X,Y,Z", "As in the job; closes")->delimiter(',')->expected(6);
   app.add_flag("--close", all.cut.close, "The job closed the surface at the volume's border");
   app.add_flag("--midpoint", all.cut.midpoint, "The job had --interpolation midpoint");
@@ -87,6 +90,7 @@ void follow(const MeshParameters& made, const CLI::App& app, Arguments& all) {
   if (is_open("--iso")) all.cut.iso = made.iso.value_or(0);
   if (is_open("--bound") && made.max_error_mm) all.question.bound = *made.max_error_mm;
   if (is_open("--scheme")) all.cut.tetrahedra = made.scheme == SchemeName::kFive ? 5 : 6;
+  if (is_open("--inside")) all.inside = to_string(made.inside);
   if (is_open("--close")) all.cut.close = made.close;
   if (is_open("--midpoint")) all.cut.midpoint = made.interpolation == Interpolation::kMidpoint;
   if (is_open("--fill-cavities")) all.cut.fill = made.fill_cavities;
@@ -123,6 +127,7 @@ int run(const CLI::App& app, Arguments& all) {
                            verify::Vec{all.crop[3], all.crop[4], all.crop[5]}});
     cut.close = true;
   }
+  if (all.inside == "below") verify::turn_over(cut, field);
   all.question.is_closed = cut.close;
   if (cut.fill) verify::fill_cavities(cut, field);
   verify::Surface surface = verify::zero_set(field, cut);

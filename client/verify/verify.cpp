@@ -262,7 +262,7 @@ class Verifier {
     count("Edges where a triangle is turned against its neighbour", places[3], true);
   }
 
-  // Normals must point to lower values, as those of the surface do. Where the surface has both of
+  // Normals must point outwards, as those of the surface do. Where the surface has both of
   // its sides within the bound, as a thin wall has, a triangle may face either.
   void check_sides(const std::vector<Nearest>& nearest) {
     const Surface& mesh = mesh_.surface();
@@ -282,7 +282,7 @@ class Verifier {
     for (std::size_t point = 0; point < area.size(); ++point) {
       if (area[point] < 0) inside_out.push_back(mesh.points[point]);
     }
-    count("Triangles that face higher values", against, false);
+    count("Triangles that face the inside", against, false);
     count("Components inside out", inside_out, true);
   }
 

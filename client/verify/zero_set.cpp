@@ -1,6 +1,7 @@
 // Marching tetrahedra, a layer of cells after the other.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -147,6 +148,13 @@ class March {
 };
 
 }  // namespace
+
+// Samples at the iso-value get less than its negative: they are not below it, so they are outside.
+void turn_over(Cut& cut, Field& field) {
+  const double outside = std::nextafter(-cut.iso, -std::numeric_limits<double>::infinity());
+  for (double& value : field.values) value = value < cut.iso ? -value : std::min(-value, outside);
+  cut.iso = -cut.iso;
+}
 
 Surface zero_set(const Field& field, const Cut& cut) {
   if (!cut.close) return March(field, cut).run();

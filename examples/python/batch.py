@@ -37,8 +37,11 @@ def main() -> int:
             print(f"{result.source}: {result.error}", file=sys.stderr)
             continue
         found = result.job["mesh"]
-        row = [found["triangles"], found["quality"]["closed"]]
-        table.writerow([result.source.name, *row, round(found["area_mm2"], 1), round(found["volume_mm3"]["smoothed"], 1)])
+        quality = found["quality"]
+        # A surface that is open, or inside out, encloses nothing.
+        enclosed = round(found["volume_mm3"]["smoothed"], 1) if quality["encloses_volume"] else ""
+        row = [found["triangles"], quality["closed"], round(found["area_mm2"], 1), enclosed]
+        table.writerow([result.source.name, *row])
     return 0 if all(results) else 1
 
 

@@ -248,7 +248,8 @@ std::optional<mesh::Topology> encode_3mf(const FileContent& content, const mesh:
   }
   const mesh::Mesh& mesh = content.mesh;
   const std::string iso = to_text(content.provenance.iso);
-  const Heading heading = {"iso " + iso,
+  const bool is_below = content.provenance.parameters.inside == Inside::kBelow;
+  const Heading heading = {(is_below ? "below iso " : "iso ") + iso,
                            "The surface at the value " + iso + '.' + about_coordinates(content)};
   Package package(sink, {mesh.triangles.size(), mesh.positions.size()}, content, heading);
   if (mesh.triangles.size() > 0) package.add_object({.name = heading.title}, mesh, context);

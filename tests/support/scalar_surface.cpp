@@ -91,7 +91,7 @@ class ScalarWalk {
     return std::isfinite(mean) ? mean : sum(x, 0.125) + sum(x + 1, 0.125);
   }
 
-  bool is_inside(const HalfCells& p) const { return !is_phantom(p) && value(p) >= options_.iso; }
+  bool is_inside(const HalfCells& p) const { return !is_phantom(p) && options_.contains(value(p)); }
 
   bool has_centre(const HalfCells& centre) const {
     return options_.scheme == Scheme::kBcc && !is_phantom(centre);
@@ -247,7 +247,10 @@ class ScalarWalk {
     std::map<HalfCells, Joining> points;
     for (const auto& [name, edge] : crossings_) {
       for (std::size_t n = 0; n < 2; ++n) points[edge[n]].crossed.insert(edge[1 - n]);
-      const std::size_t owner = distance(edge[0]) <= distance(edge[1]) ? 0 : 1;
+      const float inside = distance(edge[0]);
+      const float outside = distance(edge[1]);
+      const std::size_t owner =
+          inside < outside || (inside == outside && is_inside_first()) ? 0 : 1;
       points[edge[owner]].own[edge[1 - owner]] = name;
     }
     visit_tetrahedra([&](const Corners& corners, int) {
@@ -269,7 +272,13 @@ class ScalarWalk {
     }
   }
 
-  // From the iso-value; of those that are equally near, inside points are first.
+  // Of points that are equally near to the iso-value those of at least the iso-value are first, so
+  // both sides of a surface join the same crossings. Midpoints are equally near to all.
+  bool is_inside_first() const {
+    return options_.inside == Inside::kAbove || options_.interpolation == Interpolation::kMidpoint;
+  }
+
+  // From the iso-value.
   float distance(const HalfCells& p) const {
     if (options_.interpolation == Interpolation::kMidpoint) return 0;
     if (is_phantom(p)) return std::numeric_limits<float>::infinity();

@@ -20,7 +20,7 @@ struct MeasuredSurface {
   std::string name;
   std::optional<std::int64_t> label = {};
   std::optional<DicomSegment> segment = {};  // the label's codes
-  std::optional<double> volume_mm3 = {};     // empty: the surface is open, so it encloses none
+  std::optional<double> volume_mm3 = {};     // empty: the surface encloses none
   double area_mm2 = 0;
   double diameter_mm = 0;  // the largest distance of two vertices
 };

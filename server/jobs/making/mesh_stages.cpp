@@ -193,7 +193,8 @@ mesh::ExtractOptions extract_options(const MeshParameters& parameters, double is
           .scheme = scheme_of(parameters.scheme),
           .interpolation = parameters.interpolation,
           .close = parameters.close,
-          .regularize = is_regularized(parameters)};
+          .regularize = is_regularized(parameters),
+          .inside = parameters.inside};
 }
 
 void simplify_stage(const SampleArray& samples, const MeshRequest& request,
@@ -207,7 +208,8 @@ void simplify_stage(const SampleArray& samples, const MeshRequest& request,
   if (!is_done) simplify_checked(parameters, extracted, progress, mesh, walls, summary);
   if (parameters.normals && walls == nullptr) {
     with_sample(samples.type, [&](auto sample) {
-      set_gradient_normals(lattice_of<decltype(sample)>(samples), progress.quiet(), mesh);
+      set_gradient_normals(lattice_of<decltype(sample)>(samples), parameters.inside,
+                           progress.quiet(), mesh);
     });
   }
   set_extent(measure_extent(mesh, progress.quiet()), summary);
@@ -253,7 +255,7 @@ void conclude_quality(MeshSummary& summary) {
   MeshQuality& quality = summary.quality;
   quality.closed = summary.boundary_edges == 0;
   quality.components = summary.components;
-  quality.encloses_volume = quality.closed && quality.oriented;
+  quality.encloses_volume = encloses(quality.closed, quality.oriented, summary.volume_mm3.smoothed);
   if (quality.closed && quality.manifold && quality.oriented) {
     quality.genus = static_cast<std::int64_t>(summary.components) - summary.euler / 2;
   }

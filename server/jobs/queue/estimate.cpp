@@ -40,7 +40,9 @@ SurfaceSize surface_in_files(const MeshSummary& mesh) {
 std::string key_of_part(const MeshParameters& parameters) {
   MeshParameters part;
   part.regularize = is_regularized(parameters);
-  if (!parameters.labels && !parameters.crop && !part.regularize) return {};
+  part.inside = parameters.inside;
+  const bool is_whole = !parameters.labels && !parameters.crop;
+  if (is_whole && !part.regularize && part.inside == Inside::kAbove) return {};
   // The positions of crossings decide which of them are joined.
   if (part.regularize) part.interpolation = parameters.interpolation;
   part.crop = parameters.crop;

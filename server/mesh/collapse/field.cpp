@@ -149,7 +149,7 @@ std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions&
     const double difference = sample - options.iso;
     const auto scaled = static_cast<float>(std::scalbn(std::abs(difference), exponent));
     const float value = is_sign ? 1 : std::max(scaled, kLeast);
-    return sample >= options.iso ? value : -value;
+    return options.contains(sample) ? value : -value;
   };
   const std::size_t layer = std::size_t{dims.x} * dims.y;
   field->values.assign(dims.samples() + layer + dims.x + 2, margin == 0 ? 0 : kPhantom);

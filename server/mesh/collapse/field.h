@@ -1,6 +1,6 @@
-// The field F = sample - iso-value, scaled, whose zero set is the surface S: linear in each
-// tetrahedron of the five- or six-way split (tetrahedra.h), or of the body-centred lattice
-// (bcc_faces.h); private to this folder.
+// The field F = sample - iso-value, or its negative where lower samples are inside, scaled, whose
+// zero set is the surface S: linear in each tetrahedron of the five- or six-way split
+// (tetrahedra.h), or of the body-centred lattice (bcc_faces.h); private to this folder.
 #pragma once
 
 #include <array>

@@ -116,7 +116,8 @@ class Gradient {
 }  // namespace
 
 template <class T>
-void set_gradient_normals(const Lattice<T>& lattice, const Context& context, Mesh& mesh) {
+void set_gradient_normals(const Lattice<T>& lattice, Inside inside, const Context& context,
+                          Mesh& mesh) {
   mesh.normals.clear();
   if (!lattice.dims.has_cells()) return;
   Buffer<Vec3> of_triangles;
@@ -125,20 +126,20 @@ void set_gradient_normals(const Lattice<T>& lattice, const Context& context, Mes
   const Gradient<T> gradient(lattice);
   for_each(context, mesh.positions.size(), [&](std::size_t v) {
     if (mesh.is_on_border(v)) return;
-    const Point inward = gradient.at(mesh.positions[v]);
-    const double square = dot(inward, inward);
+    const Point slope = gradient.at(mesh.positions[v]);
+    const double square = dot(slope, slope);
     if (!std::isnormal(square)) return;  // slopes cancel out
-    const double length = -std::sqrt(square);
+    const double length = inside == Inside::kAbove ? -std::sqrt(square) : std::sqrt(square);
     Vec3& normal = mesh.normals[v];
     const double agreement =
-        (inward[0] * normal[0] + inward[1] * normal[1] + inward[2] * normal[2]) / length;
+        (slope[0] * normal[0] + slope[1] * normal[1] + slope[2] * normal[2]) / length;
     if (!(agreement > kLeastAgreement)) return;
-    for (std::size_t i = 0; i < 3; ++i) normal[i] = static_cast<float>(inward[i] / length);
+    for (std::size_t i = 0; i < 3; ++i) normal[i] = static_cast<float>(slope[i] / length);
   });
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType) \
-  template void set_gradient_normals(const Lattice<T>&, const Context&, Mesh&);
+  template void set_gradient_normals(const Lattice<T>&, Inside, const Context&, Mesh&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -11,11 +11,12 @@
 
 namespace isomesh::mesh {
 
-// Sets mesh.normals: the way in which the samples fall fastest, from central differences, linear
-// between the samples. Those of the triangles (normals.h) on caps, and where the gradient has no
-// direction or one that turns away from them. The same for any number of threads. Throws Error
-// kCancelled.
+// Sets mesh.normals: the way out in which the samples change fastest, from central differences,
+// linear between the samples. They fall that way, or rise if `inside` is kBelow. Those of the
+// triangles (normals.h) on caps, and where the gradient has no direction or one that turns away
+// from them. The same for any number of threads. Throws Error kCancelled.
 template <class T>
-void set_gradient_normals(const Lattice<T>& lattice, const Context& context, Mesh& mesh);
+void set_gradient_normals(const Lattice<T>& lattice, Inside inside, const Context& context,
+                          Mesh& mesh);
 
 }  // namespace isomesh::mesh

@@ -18,10 +18,9 @@
 namespace isomesh::mesh {
 namespace {
 
-// The smallest value of T that is inside, so that classifying compares T with T. Empty when no
-// value of T is inside.
+// The smallest value of T that is at least `iso`; empty if there is none.
 template <class T>
-std::optional<T> smallest_inside(double iso) {
+std::optional<T> smallest_from(double iso) {
   constexpr auto kLowest = static_cast<double>(std::numeric_limits<T>::lowest());
   if (iso > static_cast<double>(std::numeric_limits<T>::max())) return std::nullopt;
   if constexpr (std::is_integral_v<T>) {
@@ -32,6 +31,30 @@ std::optional<T> smallest_inside(double iso) {
                ? nearest
                : std::nextafter(nearest, std::numeric_limits<T>::infinity());
   }
+}
+
+// The largest value of T that is below `iso`; empty if there is none.
+template <class T>
+std::optional<T> largest_below(double iso) {
+  constexpr auto kMost = static_cast<double>(std::numeric_limits<T>::max());
+  if (iso <= static_cast<double>(std::numeric_limits<T>::lowest())) return std::nullopt;
+  if constexpr (std::is_integral_v<T>) {
+    return static_cast<T>(std::min(std::ceil(iso) - 1, kMost));
+  } else {
+    const auto nearest = static_cast<T>(std::min(iso, kMost));
+    return static_cast<double>(nearest) < iso
+               ? nearest
+               : std::nextafter(nearest, -std::numeric_limits<T>::infinity());
+  }
+}
+
+// Empty when no value of T is inside.
+template <class T>
+std::optional<Threshold<T>> threshold_of(const ExtractOptions& options) {
+  const bool is_above = options.inside == Inside::kAbove;
+  const auto limit = is_above ? smallest_from<T>(options.iso) : largest_below<T>(options.iso);
+  if (!limit) return std::nullopt;
+  return Threshold<T>{*limit, options.inside};
 }
 
 std::size_t places_of(Scheme scheme) { return scheme == Scheme::kBcc ? kBccPlaces : kEdgePlaces; }
@@ -120,10 +143,10 @@ SurfaceWindows::SurfaceWindows(const Lattice<T>& lattice, const ExtractOptions& 
       to_space_(lattice.to_space),
       count_(empty_count(marched_dims(lattice.dims, options.close).z)),
       joined_(std::make_unique<JoinedLayers>(count_.clusters, spool)) {
-  const auto smallest = smallest_inside<T>(options.iso);
+  const auto threshold = threshold_of<T>(options);
   context.throw_if_stopped();
-  if (!lattice.dims.has_cells() || !smallest) return;
-  extraction_ = std::make_unique<Extraction>(lattice, options, *smallest);
+  if (!lattice.dims.has_cells() || !threshold) return;
+  extraction_ = std::make_unique<Extraction>(lattice, options, *threshold);
   if (options.regularize) count_.clusters.resize(extraction_->dims.z);
   joined_->prepare();
   count_pass(*extraction_, context, count_, [&](std::uint32_t z) { joined_->put_aside(z); });

@@ -34,9 +34,10 @@ double power_for(const T* samples, std::uint64_t count, double iso) {
   return std::ldexp(1.0, std::min(-*median, kMost));
 }
 
-// Ranks samples of type T by their distance from the iso-value in single precision; what is inside
-// comes first of those that are equally near. Ranks are signed integers of bytes() each. Only those
-// of samples on different sides can be compared. Immutable.
+// Ranks samples of type T by their distance from the iso-value in single precision. Here values of
+// at least the iso-value are inside, whatever the extraction has inside: they come first of those
+// that are equally near, so both sides of a surface have the same vertices. Ranks are signed
+// integers of bytes() each. Only those of samples on different sides can be compared. Immutable.
 //
 // Integers of up to 16 bits are a whole number of steps from the iso-value's neighbours, so which
 // is nearer follows from the steps. A rank is then the number of values that are nearer. Other

@@ -24,13 +24,13 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
 // The signs of up to 64 samples; bits beyond `count` are zero.
-template <class T>
-HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
+template <class T, class IsInside>
+HWY_INLINE Word classify_word(const T* samples, std::size_t count, IsInside is_inside) {
   std::array<std::uint8_t, kWordBits> flags = {};
   if (count == kWordBits) {  // a constant count, which the compiler turns into wide compares
-    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
+    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = is_inside(samples[x]) ? 1 : 0;
   } else {
-    for (std::size_t x = 0; x < count; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
+    for (std::size_t x = 0; x < count; ++x) flags[x] = is_inside(samples[x]) ? 1 : 0;
   }
   return pack_word(flags);
 }
@@ -38,24 +38,24 @@ HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
 template <class T>
 class RowsOf final : public SampleRows {
  public:
-  RowsOf(const Lattice<T>& lattice, const ExtractOptions& options, T smallest)
+  RowsOf(const Lattice<T>& lattice, const ExtractOptions& options, const Threshold<T>& threshold)
       : lattice_(lattice),
-        iso_(options.iso),
-        smallest_(smallest),
+        options_(options),
+        threshold_(threshold),
         nearness_(options.iso, options.scheme == Scheme::kBcc,
                   power_for(lattice.samples, lattice.dims.samples(), options.iso)),
         placement_(options, lattice.dims, lattice.to_space),
         // An edge from a centre to a corner takes half a step along each axis.
         half_edges_(options, std::min(2 * placement_.nearest(), kMostNearest)) {
-    if (options.close) border_.emplace(lattice, options, smallest, placement_);
+    if (options.close) border_.emplace(lattice, options, threshold, placement_);
   }
 
   void classify(std::uint32_t y, std::uint32_t z, std::uint64_t* out) const override {
-    const T* samples = row(y, z);
-    const std::size_t width = lattice_.dims.x;
-    for (std::size_t begin = 0; begin < width; begin += kWordBits) {
-      const std::size_t count = std::min<std::size_t>(kWordBits, width - begin);
-      *out++ = classify_word(samples + begin, count, smallest_);
+    const T limit = threshold_.limit;
+    if (threshold_.inside == Inside::kAbove) {
+      classify_row(row(y, z), out, [limit](T sample) { return sample >= limit; });
+    } else {
+      classify_row(row(y, z), out, [limit](T sample) { return sample <= limit; });
     }
   }
 
@@ -111,7 +111,7 @@ class RowsOf final : public SampleRows {
       Word inside = 0;
       for (Word rest = uncertain[w]; rest != 0; rest &= rest - 1) {
         const int bit = std::countr_zero(rest);
-        inside |= Word{mean_of_cell(begin + bit, next_row, next_plane) >= iso_} << bit;
+        inside |= Word{options_.contains(mean_of_cell(begin + bit, next_row, next_plane))} << bit;
       }
       out[w] |= inside;
     }
@@ -143,6 +143,15 @@ class RowsOf final : public SampleRows {
  private:
   static constexpr double kMostNearest = 0.25;
 
+  template <class IsInside>
+  HWY_INLINE void classify_row(const T* samples, Word* out, IsInside is_inside) const {
+    const std::size_t width = lattice_.dims.x;
+    for (std::size_t begin = 0; begin < width; begin += kWordBits) {
+      const std::size_t count = std::min<std::size_t>(kWordBits, width - begin);
+      *out++ = classify_word(samples + begin, count, is_inside);
+    }
+  }
+
   struct EdgeValues {
     double from;
     double to;
@@ -171,7 +180,7 @@ class RowsOf final : public SampleRows {
         nearest[i] = values.placement->nearest();
       }
       for (std::size_t i = 0; i < count; ++i) {
-        out[begin + i] = Placement::share<T>(iso_, from[i], to[i], nearest[i]);
+        out[begin + i] = Placement::share<T>(options_.iso, from[i], to[i], nearest[i]);
       }
     }
   }
@@ -203,8 +212,8 @@ class RowsOf final : public SampleRows {
   }
 
   const Lattice<T>& lattice_;
-  const double iso_;
-  const T smallest_;
+  const ExtractOptions options_;
+  const Threshold<T> threshold_;
   const Nearness<T> nearness_;
   const Placement placement_;
   const Placement half_edges_;  // of the body-centred lattice
@@ -212,10 +221,10 @@ class RowsOf final : public SampleRows {
 };
 
 // Highway's tables hold functions, not templates.
-#define ISOMESH_FOR_TYPE(T, Name, kType)                                                          \
-  std::unique_ptr<const SampleRows> make_rows_##Name(const Lattice<T>& lattice,                   \
-                                                     const ExtractOptions& options, T smallest) { \
-    return std::make_unique<RowsOf<T>>(lattice, options, smallest);                               \
+#define ISOMESH_FOR_TYPE(T, Name, kType)                                                         \
+  std::unique_ptr<const SampleRows> make_rows_##Name(                                            \
+      const Lattice<T>& lattice, const ExtractOptions& options, const Threshold<T>& threshold) { \
+    return std::make_unique<RowsOf<T>>(lattice, options, threshold);                             \
   }
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_FOR_TYPE)
 #undef ISOMESH_FOR_TYPE
@@ -226,12 +235,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace isomesh::mesh {
 
-#define ISOMESH_DISPATCH(T, Name, kType)                                                          \
-  HWY_EXPORT(make_rows_##Name);                                                                   \
-  template <>                                                                                     \
-  std::unique_ptr<const SampleRows> make_sample_rows(const Lattice<T>& lattice,                   \
-                                                     const ExtractOptions& options, T smallest) { \
-    return HWY_DYNAMIC_DISPATCH(make_rows_##Name)(lattice, options, smallest);                    \
+#define ISOMESH_DISPATCH(T, Name, kType)                                                         \
+  HWY_EXPORT(make_rows_##Name);                                                                  \
+  template <>                                                                                    \
+  std::unique_ptr<const SampleRows> make_sample_rows(                                            \
+      const Lattice<T>& lattice, const ExtractOptions& options, const Threshold<T>& threshold) { \
+    return HWY_DYNAMIC_DISPATCH(make_rows_##Name)(lattice, options, threshold);                  \
   }
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_DISPATCH)
 #undef ISOMESH_DISPATCH

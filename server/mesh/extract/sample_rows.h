@@ -60,9 +60,9 @@ class SampleRows {
   virtual void classify(std::uint32_t y, std::uint32_t z, std::uint64_t* out) const = 0;
 
   // The places of a row's samples [begin, begin + count) in the order of nearness to the iso-value:
-  // by the distance of their values from it in single precision, and what is inside first of those
-  // that are equally near. Only places on different sides can be compared. They are signed integers
-  // of rank_bytes() each: 1, 2 or 4.
+  // by the distance of their values from it in single precision, and values of at least the
+  // iso-value first of those that are equally near. Only places on different sides can be compared.
+  // They are signed integers of rank_bytes() each: 1, 2 or 4.
   virtual void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin, std::size_t count,
                         std::byte* out) const = 0;
 
@@ -87,9 +87,10 @@ class SampleRows {
   virtual BorderVertex place_at_border(const BorderSample& cell, const EdgeEnds& ends) const = 0;
 };
 
-// `smallest`: the smallest value that is inside. `lattice` must outlive what is returned.
+// `lattice` must outlive what is returned.
 template <class T>
 std::unique_ptr<const SampleRows> make_sample_rows(const Lattice<T>& lattice,
-                                                   const ExtractOptions& options, T smallest);
+                                                   const ExtractOptions& options,
+                                                   const Threshold<T>& threshold);
 
 }  // namespace isomesh::mesh

@@ -60,14 +60,14 @@ struct Marching {
 
 // Data that all slabs of an extraction at an iso-value share.
 struct Extraction : Marching {
-  // `smallest`: the smallest value that is inside.
   template <class T>
-  Extraction(const Lattice<T>& lattice, const ExtractOptions& options, T smallest)
+  Extraction(const Lattice<T>& lattice, const ExtractOptions& options,
+             const Threshold<T>& threshold)
       : Marching(lattice.dims, lattice.to_space, options.scheme, options.close),
         inner(lattice.dims),
         is_midpoint(options.interpolation == Interpolation::kMidpoint),
         regularize(options.regularize),
-        samples(make_sample_rows(lattice, options, smallest)) {}
+        samples(make_sample_rows(lattice, options, threshold)) {}
 
   // Prepares for a surface that is regularised, when it is written.
   void keep(std::span<const ClusterLayer> joining) {

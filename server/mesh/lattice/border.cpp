@@ -30,11 +30,11 @@ double nearest_on_border(double nearest) { return kContourWays * least_way(neare
 
 template <class T>
 BorderPlacement<T>::BorderPlacement(const Lattice<T>& lattice, const ExtractOptions& options,
-                                    T smallest, const Placement& interior)
+                                    const Threshold<T>& threshold, const Placement& interior)
     : lattice_(lattice),
       dims_{lattice.dims.x, lattice.dims.y, lattice.dims.z},
       five_(options.scheme == Scheme::kFive),
-      smallest_(smallest),
+      threshold_(threshold),
       interior_(interior),
       least_way_(least_way(interior.nearest())),
       contour_(options, nearest_on_border(interior.nearest())) {}
@@ -93,7 +93,7 @@ T BorderPlacement<T>::value(const Sample& sample) const {
 
 template <class T>
 bool BorderPlacement<T>::is_inside(const Sample& sample) const {
-  return value(sample) >= smallest_;
+  return threshold_.contains(value(sample));
 }
 
 // The side of the sample's phantom neighbour along the axis; 0 if there is none.

@@ -45,8 +45,8 @@ template <class T>
 class BorderPlacement {
  public:
   // `interior` places what is not on the border. `lattice` must outlive this.
-  BorderPlacement(const Lattice<T>& lattice, const ExtractOptions& options, T smallest,
-                  const Placement& interior);
+  BorderPlacement(const Lattice<T>& lattice, const ExtractOptions& options,
+                  const Threshold<T>& threshold, const Placement& interior);
 
   // The vertex on a crossed edge between corners of the cell whose corner 0 is `cell`.
   BorderVertex place(const BorderSample& cell, const EdgeEnds& ends) const;
@@ -70,7 +70,7 @@ class BorderPlacement {
   const Lattice<T>& lattice_;
   const Sample dims_;
   const bool five_;
-  const T smallest_;
+  const Threshold<T> threshold_;
   const Placement interior_;
   const double least_way_;  // the least that a vertex gives way, as a share of the spacing
   const Placement contour_;

@@ -9,12 +9,27 @@
 
 namespace isomesh::mesh {
 
+// The values of T that are inside, so that classifying compares T with T.
+template <class T>
+struct Threshold {
+  T limit = {};  // the smallest value that is inside, or the largest
+  Inside inside = Inside::kAbove;
+
+  bool contains(T value) const {
+    return inside == Inside::kAbove ? value >= limit : value <= limit;
+  }
+};
+
 struct ExtractOptions {
-  double iso = 0;  // a sample is inside when its value is >= iso
+  double iso = 0;
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
-  bool close = false;       // cap the surface where it meets the lattice's border
-  bool regularize = false;  // join crossings around a sample, see links.h
+  bool close = false;              // cap the surface where it meets the lattice's border
+  bool regularize = false;         // join crossings around a sample, see links.h
+  Inside inside = Inside::kAbove;  // a sample is inside when its value is >= iso, or when it is not
+
+  // The same for means of samples.
+  bool contains(double value) const { return (value >= iso) == (inside == Inside::kAbove); }
 };
 
 // Immutable, so safe to read from several threads.

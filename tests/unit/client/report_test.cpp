@@ -110,6 +110,32 @@ TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
       HasSubstr("volume          none: the triangles disagree about which side is outside"));
 }
 
+TEST(MeshReport, OffersTheOtherSideOfASurfaceThatIsInsideOut) {
+  MeshSummary mesh;
+  mesh.iso = 0;
+  mesh.triangles = 7;
+  mesh.volume_mm3 = {.extracted = -2117.3, .smoothed = -2117.3};
+  mesh.quality.closed = mesh.quality.oriented = true;
+  const std::string report = mesh_report(mesh);
+  EXPECT_THAT(report, HasSubstr("volume          none: the surface is inside out; "));
+  EXPECT_THAT(report, HasSubstr("--inside below"));
+  EXPECT_THAT(report, Not(HasSubstr("2,117")));
+  EXPECT_THAT(mesh_report(mesh, length_unit({}), Inside::kBelow), HasSubstr("--inside above"));
+  mesh.iso.reset();
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("volume          none: the surface is inside out\n"));
+}
+
+TEST(MeshReport, SaysThatALabelThatIsInsideOutEnclosesNothing) {
+  MeshSummary mesh;
+  mesh.labels = {{.label = 1, .closed = true, .oriented = true, .volume_mm3 = -27}};
+  const std::string report = mesh_report(mesh);
+  EXPECT_THAT(report, HasSubstr(" none "));
+  EXPECT_THAT(report, Not(HasSubstr("-27")));
+  EXPECT_THAT(report, HasSubstr("A closed label without a volume is inside out: "));
+  EXPECT_THAT(report, Not(HasSubstr("--inside")));
+  EXPECT_THAT(report, Not(HasSubstr("not oriented")));
+}
+
 TEST(MeshReport, SaysThatALabelThatIsNotOrientedEnclosesNothing) {
   MeshSummary mesh;
   mesh.labels = {{.label = 1, .closed = true, .oriented = false, .volume_mm3 = 27}};

@@ -82,6 +82,19 @@ TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {
   EXPECT_GT(exact(parameters).triangles, 0U);
 }
 
+TEST_F(EstimateTest, TellsTheSidesOfASurfaceApart) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.close = true;
+  for (const bool regularize : {false, true}) {
+    parameters.regularize = regularize;
+    parameters.inside = Inside::kAbove;
+    const std::uint64_t above = exact(parameters).triangles;
+    parameters.inside = Inside::kBelow;
+    EXPECT_GT(exact(parameters).triangles, above) << "the box around the sphere has caps";
+  }
+}
+
 TEST_F(EstimateTest, CountsWhatIsJoined) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);

@@ -55,7 +55,7 @@ TEST(GradientNormals, OfABallPointFromItsCentre) {
     Buffer<Vec3> normals;
     vertex_normals(mesh, {}, normals);
     const double of_triangles = worst(mesh, normals, outward);
-    set_gradient_normals(volume.lattice(), {}, mesh);
+    set_gradient_normals(volume.lattice(), Inside::kAbove, {}, mesh);
     vertex_normals(mesh, {}, normals);
     EXPECT_GT(worst(mesh, normals, outward), std::cos(6 * std::numbers::pi / 180));
     EXPECT_GT(worst(mesh, normals, outward), of_triangles);
@@ -67,7 +67,7 @@ TEST(GradientNormals, LeaveCapsFlat) {
   Mesh mesh = test::extracted(volume, {.close = true});
   Buffer<Vec3> of_triangles;
   vertex_normals(mesh, {}, of_triangles);
-  set_gradient_normals(volume.lattice(), {}, mesh);
+  set_gradient_normals(volume.lattice(), Inside::kAbove, {}, mesh);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
     if (!mesh.is_on_border(v)) continue;
     EXPECT_EQ(mesh.normals[v], of_triangles[v]);
@@ -81,7 +81,7 @@ TEST(GradientNormals, AreThoseOfTrianglesWhereSamplesHaveNoDirection) {
   Mesh mesh = test::extracted(volume, {.iso = 99.999});
   Buffer<Vec3> of_triangles;
   vertex_normals(mesh, {}, of_triangles);
-  set_gradient_normals(volume.lattice(), {}, mesh);
+  set_gradient_normals(volume.lattice(), Inside::kAbove, {}, mesh);
   ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
   for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
     const Vec3& n = mesh.normals[v];
@@ -94,7 +94,7 @@ Buffer<Vec3> normals_of_a_ball(double scale) {
   const auto volume =
       test::sample<double>(test::scaled(test::sphere({10, 10, 10}, 7.3), scale, 0), {21, 21, 21});
   Mesh mesh = test::extracted(volume, {});
-  set_gradient_normals(volume.lattice(), {}, mesh);
+  set_gradient_normals(volume.lattice(), Inside::kAbove, {}, mesh);
   Buffer<Vec3> normals;
   vertex_normals(mesh, {}, normals);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {

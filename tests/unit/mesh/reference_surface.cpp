@@ -18,7 +18,7 @@ std::string describe(const Dims& dims, const ExtractOptions& options) {
   std::ostringstream text;
   text << dims.x << "x" << dims.y << "x" << dims.z << ", iso " << options.iso << ", scheme "
        << static_cast<int>(options.scheme) << ", " << to_string(options.interpolation)
-       << (options.close ? ", closed" : "");
+       << (options.close ? ", closed" : "") << (options.inside == Inside::kBelow ? ", below" : "");
   return text.str();
 }
 

@@ -47,7 +47,7 @@ TEST(SurfaceWindows, HoldWhatOneLayerJoinsWhileTheyCount) {
         test::sample<std::uint8_t>(test::scaled(test::gyroid(8), 50, 60), {24, 24, layers});
     const auto lattice = volume.lattice();
     const ExtractOptions options = {.iso = 60, .regularize = true};
-    const Extraction extraction(lattice, options, std::uint8_t{60});
+    const Extraction extraction(lattice, options, Threshold<std::uint8_t>{60});
     SurfaceCount count = empty_count(layers);
     count.clusters.resize(layers);
     WatchingSpool spool;
@@ -87,7 +87,7 @@ TEST(WriteSlab, ReadsJoinedCrossingsOfTwoPlanesBehindAndOneRow) {
     const SurfaceCount count = count_surface(lattice, options, {});
     const std::size_t rows_of_samples = scheme == Scheme::kBcc ? 2 : 1;
     const auto written = [&](const Slab& slab, const SurfaceCount& from) {
-      Extraction extraction(lattice, options, std::uint8_t{60});
+      Extraction extraction(lattice, options, Threshold<std::uint8_t>{60});
       extraction.keep(from.clusters);
       IndexMemory memory(index_memory_size(extraction.dims, kBccPlaces));
       Mesh mesh;

@@ -90,6 +90,7 @@ TEST(JobBody, RefusesWhatLabelsCannotHave) {
       {R"("labels": [0])", "labels"},
       {R"("labels": [5], "background": 5)", "labels"},
       {R"("labels": "all", "interpolation": "linear")", "interpolation"},
+      {R"("labels": "all", "inside": "below")", "inside"},
       {R"("labels": "all", "fill_cavities": true)", "fill_cavities"},
       {R"("labels": "all", "components": {"keep": 1})", "components"},
       {R"("labels": "all", "label_names": {"3": ""})", "label_names.3"},
@@ -127,6 +128,7 @@ TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
 
 TEST(JobBody, TakesEveryMember) {
   const JobParameters unusual = {{.iso = -150,
+                                  .inside = Inside::kBelow,
                                   .scheme = SchemeName::kFive,
                                   .interpolation = Interpolation::kMidpoint,
                                   .regularize = true,
@@ -143,7 +145,7 @@ TEST(JobBody, TakesEveryMember) {
                                  {},
                                  "abc",
                                  Priority::kBulk};
-  EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,
+  EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "inside": "below", "scheme": 5,
       "interpolation": "midpoint", "regularize": true, "passes": 17, "smoothing": "taubin",
       "lambda": 0.25, "pass_band": 0.05, "max_displacement_mm": 0.5,
       "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
@@ -287,6 +289,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Refused{R"("scheme": "6")", "scheme"}, Refused{R"("scheme": true)", "scheme"},
         Refused{R"("scheme": null)", "scheme"}, Refused{R"("scheme": [6])", "scheme"},
+        Refused{R"("inside": true)", "inside"}, Refused{R"("inside": "Below")", "inside"},
         Refused{R"("interpolation": 1)", "interpolation"},
         Refused{R"("interpolation": "cubic")", "interpolation"},
         Refused{R"("interpolation": "Linear")", "interpolation"},

@@ -68,6 +68,28 @@ TEST(Verify, AcceptsJobsWithOtherParameters) {
   }
 }
 
+TEST(Verify, AcceptsJobsAroundDarkStructures) {
+  for (const bool close : {false, true}) {
+    for (const Interpolation interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
+      MeshParameters parameters = parameters_within(0.1);
+      parameters.inside = Inside::kBelow;
+      parameters.close = close;
+      parameters.interpolation = interpolation;
+      expect_right(open_volume({}), parameters);
+      expect_right(noise<float>({-1, 0, 1}, {12, 11, 10}, 3), parameters);
+    }
+  }
+}
+
+TEST(Verify, RejectsTheOtherSideOfASurface) {
+  MeshParameters parameters = parameters_within(0.1);
+  const verify::Surface mesh = verify::read_surface(made(balls(), parameters));
+  parameters.inside = Inside::kBelow;
+  const verify::Verdict said = verdict(mesh, balls(), parameters);
+  EXPECT_FALSE(said.holds);
+  EXPECT_THAT(said.text, HasSubstr("Components inside out: 3"));
+}
+
 // Samples that equal the iso-value are on the surface.
 TEST(Verify, AcceptsJobsOfSamplesAtTheIsoValue) {
   const SampleVolume<float> volume = noise<float>({-1, 0, 1}, {12, 11, 10}, 3);

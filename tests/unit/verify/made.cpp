@@ -72,6 +72,7 @@ verify::Verdict verdict(verify::Surface mesh, const SampleVolume<float>& volume,
   cut.tetrahedra = parameters.scheme == SchemeName::kFive ? 5 : 6;
   cut.close = parameters.close;
   cut.midpoint = parameters.interpolation == Interpolation::kMidpoint;
+  if (parameters.inside == Inside::kBelow) verify::turn_over(cut, field);
   if (parameters.fill_cavities) verify::fill_cavities(cut, field);
   verify::Surface surface = verify::zero_set(field, cut);
   verify::Question question;

@@ -126,6 +126,14 @@ describe('a surface that is not what was meant', () => {
     await page.waitForURL(/#\/volumes\//);
   });
 
+  it('has no volume while it is inside out, and is turned over by a link', async ({ daemon, page }) => {
+    await openJob(page, await daemon.make({ volume: ball, iso: 100, inside: 'below', formats: ['glb'] }));
+    const panel = page.getByLabel('Job', { exact: true });
+    await expect.poll(() => panel.innerText()).toMatch(/Volume\s+none: the surface is inside out/);
+    await panel.getByRole('button', { name: 'Take the bright side' }).click();
+    await expect.poll(() => panel.innerText()).toMatch(/Volume\s+[\d\u202f]+ mm\u00b3/);
+  });
+
   it('has no volume while it is open, and is closed by a link', async ({ daemon, page }) => {
     const cut = await daemon.upload(ballNrrd(24, 14));
     await openJob(page, await daemon.make({ volume: cut, iso: 100, formats: ['glb'] }));

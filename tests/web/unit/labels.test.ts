@@ -83,8 +83,9 @@ describe('a job by labels', () => {
   });
 
   it('is told from others in words', () => {
-    expect([defaults, all, some, withLabels(defaults, [7])].map(surfaceInWords)).toEqual([
+    expect([defaults, { ...defaults, inside: 'below' as const }, all, some, withLabels(defaults, [7])].map(surfaceInWords)).toEqual([
       'iso 60',
+      'below iso 60',
       'all labels',
       '2 labels',
       'label 7',
@@ -179,5 +180,9 @@ describe('the table of labels', () => {
       `3,"'=A1, ""x"" y",,10,30,,99,1,4`,
       '',
     ]);
+  });
+
+  it('has no volume for a label whose surface is inside out', () => {
+    expect(labelsCsv([label(1, 'Rib 10', { volume_mm3: -8 })], new Map()).split('\r\n')[1]).toBe('1,Rib 10,,10,10,,9,1,4');
   });
 });

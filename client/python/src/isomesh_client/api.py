@@ -278,6 +278,7 @@ class Callback(TypedDict):
 
 
 Iso = Union["Union[float, Literal['otsu'], Literal['skin'], Literal['soft-tissue'], Literal['bone'], Literal['segment']]"]
+Inside = Literal['above', 'below']
 Labels = Union["Union[Literal['all'], Sequence[int]]"]
 Background = int
 LabelNames = Union['Union[Mapping[int, str], Mapping[str, str]]']
@@ -344,6 +345,7 @@ class JobParametersDraco(TypedDict):
 
 class _Parameters(TypedDict, total=False):
     iso: Iso
+    inside: Inside
     labels: Labels
     background: Background
     label_names: LabelNames
@@ -384,9 +386,14 @@ class JobOptions(_Parameters, total=False):
 
     iso
         The iso-value in the volume's units, otsu for Otsu's threshold, or the name of one of
-        the volume's presets. A sample is inside when its value is >= iso. A CT in Hounsfield
-        units has skin, soft-tissue and bone, a fractional segmentation has segment, if the
-        value occurs in it. The job then has the preset's number.
+        the volume's presets. A sample is inside when its value is >= iso; see inside. A CT in
+        Hounsfield units has skin, soft-tissue and bone, a fractional segmentation has segment,
+        if the value occurs in it. The job then has the preset's number.
+
+    inside
+        The samples inside the surface: those of at least the iso-value, or those below it.
+        below is for dark structures, such as airways, ventricles and cysts. Samples beyond the
+        volume's border are never inside. Padding and NaN have the value of the smallest sample.
 
     labels
         Labels of a segmentation to mesh instead of an iso-value: their values, or all. Each
@@ -690,8 +697,9 @@ class MeshSummarySimplified(TypedDict):
 class MeshSummaryVolumeMm3(TypedDict):
     """The volume that the surface encloses, before and after smoothing and simplification. An
     open surface encloses nothing. It is then closed by a cone to the first sample, so the
-    number depends on that point and may be negative. See quality.encloses_volume and the
-    parameter close."""
+    number depends on that point and may be negative. A surface that is inside out encloses
+    nothing either, and its number is negative. See quality.encloses_volume and the parameters
+    close and inside."""
 
     extracted: float
     smoothed: float
@@ -868,7 +876,8 @@ class LabelSummary(TypedDict):
     area_mm2: float
     #: The volume that the surface encloses, if it is closed and oriented. Otherwise the number
     #: depends on the point of reference and may be negative: the label touches the border of the
-    #: volume. See the parameter close.
+    #: volume. See the parameter close. A closed label has a negative number if its surface is only
+    #: around a cavity, which encloses nothing.
     volume_mm3: float
     #: The label's files in the ZIP, one for each format.
     files: Mapping[str, LabelFile]
@@ -916,8 +925,9 @@ class MeshQuality(TypedDict):
     aspect_ratio: QualityStages
     #: The smallest angle of each triangle, at most 60 degrees. The bins are 3 degrees wide.
     smallest_angle_deg: QualityStages
-    #: Whether the surface is closed and oriented, so that the volumes are those that it encloses.
-    #: Otherwise they depend on the point of reference.
+    #: Whether the volumes are those that the surface encloses: it is closed and oriented, and not
+    #: inside out. The volumes of an open surface depend on the point of reference. Those of a
+    #: surface around a dark structure are negative, unless the job has inside: below.
     encloses_volume: bool
     self_intersections: NotRequired[MeshQualitySelfIntersections]
 

@@ -76,9 +76,9 @@ class Batches:
         nifti_form: str = "",
         modality: str = "",
         # `generate` writes these lines: the parameters of a job.
-        iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
-        label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
-        label_values: api.LabelValues = OMITTED, scheme: api.Scheme = OMITTED,
+        iso: api.Iso = OMITTED, inside: api.Inside = OMITTED, labels: api.Labels = OMITTED,
+        background: api.Background = OMITTED, label_names: api.LabelNames = OMITTED,
+        label_colors: api.LabelColors = OMITTED, label_values: api.LabelValues = OMITTED, scheme: api.Scheme = OMITTED,
         interpolation: api.Interpolation = OMITTED, regularize: api.Regularize = OMITTED, passes: api.Passes = OMITTED,
         smoothing: api.Smoothing = OMITTED, lambda_: api.Lambda = OMITTED, pass_band: api.PassBand = OMITTED,
         max_displacement_mm: api.MaxDisplacement = OMITTED, untangle: api.Untangle = OMITTED,

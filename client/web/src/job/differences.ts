@@ -13,8 +13,8 @@ const words: Record<string, (job: JobParameters) => string> = {
   regularize: ({ regularize }) => (regularize === true ? 'regularized' : 'not regularized'),
   close: ({ close }) => (close ? 'closed' : 'open'),
 };
-// A title begins with the first three; the others do not change the surface.
-const besides = ['volume', 'iso', 'labels', 'formats', 'priority', 'label_names', 'label_colors'];
+// A title begins with the first four; the others do not change the surface.
+const besides = ['volume', 'iso', 'inside', 'labels', 'formats', 'priority', 'label_names', 'label_colors'];
 
 function valueInWords({ kind, unit }: Parameter, value: Value): string {
   if (typeof value === 'boolean') return value ? 'yes' : 'no';

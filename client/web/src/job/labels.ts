@@ -33,6 +33,11 @@ export const labelOrders = {
 
 export type LabelOrder = keyof typeof labelOrders;
 
+// Unless a label is closed and oriented, the sum over its triangles is no volume. One around a cavity alone is inside out.
+export function enclosesVolume({ closed, oriented, volume_mm3: volume }: LabelSummary): boolean {
+  return closed && oriented && volume >= 0;
+}
+
 // A table of the labels for a spreadsheet. The volume of a mesh that encloses none is empty.
 export function labelsCsv(labels: readonly LabelSummary[], colours: ReadonlyMap<Label, string>): string {
   const quoted = (text: string): string => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
@@ -44,7 +49,7 @@ export function labelsCsv(labels: readonly LabelSummary[], colours: ReadonlyMap<
     colours.get(label.label) ?? label.color ?? '',
     label.voxels,
     label.voxels_mm3,
-    label.closed && label.oriented ? label.volume_mm3 : '',
+    enclosesVolume(label) ? label.volume_mm3 : '',
     label.area_mm2,
     label.components,
     label.triangles,

@@ -181,8 +181,8 @@ export function filesOf({ labels, formats }: JobParameters): MeshFormat[] {
 }
 
 // The surface in words: iso 60, all labels.
-export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string {
-  if (labels === undefined) return `iso ${formatIso(iso ?? 'otsu')}`;
+export function surfaceInWords({ inside, iso, labels }: Partial<JobParameters>): string {
+  if (labels === undefined) return `${inside === 'below' ? 'below ' : ''}iso ${formatIso(iso ?? 'otsu')}`;
   if (labels === 'all') return 'all labels';
   const [only] = labels;
   return labels.length === 1 ? `label ${only}` : `${labels.length} labels`;

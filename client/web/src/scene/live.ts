@@ -45,6 +45,7 @@ export class LiveSurface {
   private readonly resizing: ResizeObserver;
   private cursor: Vector3 | null = null;
   private iso = NaN;
+  private isBelow = false;
   private look: Look | null = null;
   private isOfLabels = false;
   private crop: readonly [Vector3, Vector3] | null = null;
@@ -110,10 +111,11 @@ export class LiveSurface {
     this.changed();
   }
 
-  // In the volume's units, of a preview of values.
-  setIso(iso: number): void {
-    if (this.iso === iso) return;
+  // In the volume's units, of a preview of values. Lower values are inside if it is below.
+  setIso(iso: number, isBelow: boolean): void {
+    if (this.iso === iso && this.isBelow === isBelow) return;
     this.iso = iso;
+    this.isBelow = isBelow;
     this.moved();
   }
 
@@ -239,9 +241,9 @@ export class LiveSurface {
   }
 
   private sceneOf(preview: Preview, reach: number): LiveScene {
-    const { camera, look, crop, cursor } = this;
+    const { camera, look, crop, cursor, isBelow } = this;
     const kind = look === null ? 'surface' : this.isOfLabels ? 'labels' : 'through';
-    return { preview, camera, target: this.controls.target, iso: inPreview(preview, this.iso), reach, kind, look, crop, cursor };
+    return { preview, camera, target: this.controls.target, iso: inPreview(preview, this.iso), isBelow, reach, kind, look, crop, cursor };
   }
 
   private bandsFor(pixels: number, kind: 'moving' | 'resting'): number {

@@ -37,6 +37,8 @@ export interface LiveScene {
   target: Vector3;
   // In parts of the preview's window.
   iso: number;
+  // True if lower values are inside.
+  isBelow: boolean;
   // The length of a step, in samples; a longer one may pass over what is thinner.
   reach: number;
   // The surface at the iso-value, a look through the samples, or labels by the look's colours.
@@ -84,7 +86,7 @@ function crossOf({ preview, cursor }: LiveScene): Float32Array<ArrayBuffer> {
 }
 
 // The scene as the shader takes it: places in samples, directions as unit vectors in millimetres.
-function valuesOf({ preview, camera, target, iso, reach, kind, look, crop }: LiveScene): Record<string, number | Vector3 | Matrix4> {
+function valuesOf({ preview, camera, target, iso, isBelow, reach, kind, look, crop }: LiveScene): Record<string, number | Vector3 | Matrix4> {
   const ofSamples = placeOfSamples(preview);
   const dims = new Vector3(...preview.dims);
   const last = dims.clone().subScalar(1);
@@ -101,6 +103,7 @@ function valuesOf({ preview, camera, target, iso, reach, kind, look, crop }: Liv
     kind: kinds[kind],
     cropLow: low.clone().multiply(last),
     isCropped: crop ? 1 : 0,
+    isBelow: isBelow ? 1 : 0,
     cropHigh: high.clone().multiply(last),
     blockSize,
     dims,

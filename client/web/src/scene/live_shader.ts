@@ -63,6 +63,7 @@ uniform vec3 colour;
 uniform float kind;
 uniform vec3 cropLow;
 uniform float isCropped;
+uniform float isBelow;
 uniform vec3 cropHigh;
 uniform float blockSize;
 uniform vec3 dims;
@@ -208,7 +209,7 @@ vec4 surface(vec3 direction, float begin, float end, float stride) {
   bool isInside = isInsideAt(direction, t);
   float blockEnd = -1.0;
   // A crop closes the surface where it is cut.
-  if (isCropped > 0.0 && isInside) { return vec4(0.62 * colour, 1.0); }
+  if (isCropped > 0.0 && isInside != (isBelow > 0.0)) { return vec4(0.62 * colour, 1.0); }
   for (int i = 0; i < mostSteps && t < end; i++) {
     if (t >= blockEnd) {
       vec3 block = blockAt(direction, t, stride);

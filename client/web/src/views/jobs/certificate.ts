@@ -1,6 +1,7 @@
 // The measured error of a mesh and the faults of its surface: the certificate, self-intersections,
 // openings.
 import type { DistanceSummary, Job, MeshSummary } from '../../api/types';
+import { isByLabels } from '../../job/table';
 import type { MakeVariant } from '../../job/variants';
 import { button, h, svg, type Child } from '../../ui/dom';
 import { formatCount, formatSize, formatValue, meshFormatTitle, millimetres } from '../../ui/format';
@@ -128,15 +129,28 @@ export function thinnestText({ thickness }: Pick<MeshSummary, 'thickness'>): str
 }
 
 // The reason why a surface encloses no volume.
-export function noVolumeText({ closed }: { closed: boolean }): string {
-  return closed ? 'none: the triangles disagree about which side is outside' : 'none: the surface is open';
+export function noVolumeText({ closed, oriented }: { closed: boolean; oriented: boolean }): string {
+  if (!closed) return 'none: the surface is open';
+  return oriented ? 'none: the surface is inside out' : 'none: the triangles disagree about which side is outside';
+}
+
+// Starts a job with the other side of the iso-value inside.
+export function otherSide({ parameters }: Job, make: MakeVariant): Child {
+  if (isByLabels(parameters)) return false;
+  const [inside, text] = parameters.inside === 'below' ? (['above', 'Take the bright side'] as const) : (['below', 'Take the dark side'] as const);
+  const title = `Starts a job with the samples ${inside} the iso-value inside`;
+  return button(text, () => make({ inside }), { class: 'link', title });
 }
 
 // For a surface whose volume would be a number without a meaning.
-export function openText({ parameters, mesh }: Job, make: MakeVariant): Child {
-  if (mesh?.quality.closed) return h('span.attention', noVolumeText(mesh.quality));
+export function openText(job: Job, make: MakeVariant): Child {
+  const { parameters, mesh } = job;
+  const { closed, oriented } = mesh?.quality ?? { closed: false, oriented: false };
+  const text = noVolumeText({ closed, oriented });
+  if (closed && !oriented) return h('span.attention', text);
+  if (closed) return h('span.attention', [`${text}. `, otherSide(job, make)]);
   return h('span.attention', [
-    `${noVolumeText({ closed: false })}. `,
+    `${text}. `,
     !parameters.close && button('Close it', () => make({ close: true }), { class: 'link', title: 'Starts a job that closes the surface at the border of the volume' }),
   ]);
 }

@@ -3,7 +3,7 @@ import type { Job, MeshSummary, Vec3 } from '../../api/types';
 import { isForPrinter, nozzle } from '../../job/printing';
 import { isByLabels } from '../../job/table';
 import { makeVariant } from '../../job/variants';
-import { thinnestText } from './certificate';
+import { noVolumeText, otherSide, thinnestText } from './certificate';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNumber, formatSize, meshFormatTitle, millimetres } from '../../ui/format';
 
@@ -38,12 +38,14 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
   const make = makeVariant(job);
   const remedy = (text: string, title: string, ...[changes]: Parameters<typeof make>): HTMLElement =>
     button(text, () => make(changes), { class: 'link', title });
-  const { closed, self_intersections: crossings } = mesh.quality;
+  const { closed, encloses_volume: isSolid, self_intersections: crossings } = mesh.quality;
   const { certificate, components } = mesh;
 
   const points = [
-    closed
+    isSolid
       ? point('good', 'Closed: it has an inside.')
+      : closed
+      ? point('bad', `Volume ${noVolumeText(mesh.quality)}. `, otherSide(job, make))
       : point('bad', `Open at ${formatCount(mesh.boundary_edges)} edges. `, !parameters.close && remedy('Close it', 'Starts a job that closes the surface', { close: true })),
   ];
   if (components === 1) points.push(point('good', 'One connected component.'));

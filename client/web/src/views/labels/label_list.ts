@@ -1,6 +1,6 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
 import type { Job, JobParameters, LabelSummary, MeshFormat, Volume, Label } from '../../api/types';
-import { labelOrders, labelsCsv, labelTitle, type LabelOrder, type LabelState } from '../../job/labels';
+import { enclosesVolume, labelOrders, labelsCsv, labelTitle, type LabelOrder, type LabelState } from '../../job/labels';
 import { holdsAllLabels, meshFormats } from '../../job/table';
 import { fileNameOf, makeVariant, saveVariant } from '../../job/variants';
 import { button, checkbox, h, select } from '../../ui/dom';
@@ -12,10 +12,11 @@ import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
 import { wallTable } from './wall_table';
 
-// Unless a label is closed and oriented, the sum over its triangles is no volume.
-export function volumeText({ closed, oriented, volume_mm3: volume }: LabelSummary): string {
-  if (closed && oriented) return `${formatValue(volume)} mm\u00b3`;
-  return closed ? 'none (not oriented)' : 'none (open)';
+export function volumeText(label: LabelSummary): string {
+  const { closed, oriented, volume_mm3: volume } = label;
+  if (enclosesVolume(label)) return `${formatValue(volume)} mm\u00b3`;
+  if (!closed) return 'none (open)';
+  return oriented ? 'none (inside out)' : 'none (not oriented)';
 }
 
 export function areaText({ area_mm2: area }: LabelSummary): string {

@@ -45,6 +45,7 @@ export class LiveView {
   private surface: LiveSurface | null = null;
   private preview: Preview | null = null;
   private iso: number | null = null;
+  private isBelow = false;
   private cursor: Vec3 = [0, 0, 0];
   // What is fetched: a window, or the key of a map of labels.
   private wanted = '';
@@ -133,11 +134,12 @@ export class LiveView {
     this.load();
   }
 
-  // The surface at that iso-value. The cursor is where the slices meet.
-  show(iso: number, cursor: Vec3): void {
+  // The surface at that iso-value, with lower values inside if it is below. The cursor is where the slices meet.
+  show(iso: number, isBelow: boolean, cursor: Vec3): void {
     this.choice.hidden = false;
     this.labels = null;
     this.iso = iso;
+    this.isBelow = isBelow;
     this.cursor = cursor;
     this.view.hidden = false;
     const window = this.windowFor(iso);
@@ -162,7 +164,7 @@ export class LiveView {
   private showIso(): void {
     if (!this.surface || !this.preview || this.iso === null || Number.isNaN(this.preview.window[0])) return;
     this.showPlace(`Preview of the surface at iso-value ${formatValue(this.iso, this.host.window[1] - this.host.window[0])}`);
-    this.surface.setIso(this.iso);
+    this.surface.setIso(this.iso, this.isBelow);
   }
 
   private showPlace(name: string): void {

@@ -42,7 +42,7 @@ interface Control {
 // Names, colours and values of labels come from the volume.
 const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
 // The parameters that are always visible, in rows. All others are under "More", these first.
-const front = [['max_error_mm'], ['triangles', 'certify'], ['fill_cavities']];
+const front = [['inside'], ['max_error_mm'], ['triangles', 'certify'], ['fill_cavities']];
 const behind = [['scheme', 'interpolation'], ['regularize'], ['smoothing'], ['passes', 'lambda'], ['priority']];
 
 export const shown = parameters.filter(({ name }) => !elsewhere.includes(name));

@@ -263,7 +263,7 @@ class Prepare {
   private kindChoice(): HTMLElement | null {
     if (!isInteger(this.volume)) return null;
     const choices = [
-      { value: 'iso', label: 'One surface', title: 'One surface around all samples at or above the iso-value' },
+      { value: 'iso', label: 'One surface', title: 'One surface at the iso-value' },
       { value: 'labels', label: eachLabel, title: 'One surface around each label of a segmentation' },
     ] as const;
     return segmented('What to mesh', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
@@ -360,7 +360,7 @@ class Prepare {
     choose(this.surfaceKind, kindOf(this.parameters));
     for (const view of [...this.slices, this.layers, this.oblique]) view.update();
     if (isByLabels(this.parameters)) this.live.showLabels(this.labelLook, this.cursor);
-    else this.live.show(this.iso, this.cursor);
+    else this.live.show(this.iso, this.parameters.inside === 'below', this.cursor);
     this.live.showCrop(this.box);
     this.crop?.show(this.box);
     this.histogram.show(this.iso, this.window);

@@ -84,7 +84,8 @@ export class ComponentList {
 
   private sizeOf({ volume, area, triangles }: PartSummary): string {
     const isClosed = this.job.mesh?.quality.encloses_volume ?? false;
-    return `${isClosed ? `volume ${formatValue(volume)} mm\u00b3, ` : ''}area ${formatValue(area)} mm\u00b2, ${formatCount(triangles)} triangles`;
+    const enclosed = volume < 0 ? 'inside out, ' : `volume ${formatValue(volume)} mm\u00b3, `;
+    return `${isClosed ? enclosed : ''}area ${formatValue(area)} mm\u00b2, ${formatCount(triangles)} triangles`;
   }
 
   // Some milliseconds at a time.
