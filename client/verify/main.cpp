@@ -34,10 +34,13 @@ void add_options(CLI::App& app, Arguments& all) {
   const auto add = [&](const char* name, auto& value, const char* type, const char* help) {
     return app.add_option(name, value, help)->type_name(type);
   };
-  add("FILE", all.mesh, "FILE", "The mesh: STL, PLY or GLB, without a codec")->required();
+  add("FILE", all.mesh, "FILE",
+      "The mesh of a job at an iso-value: STL, PLY or GLB, without a codec")
+      ->required();
   add("--volume", all.volume, "FILE", "Its volume: a file, a folder or an archive")->required();
   add("--iso", all.cut.iso, "VALUE", "The iso-value of the job")->required();
-  add("--bound", all.question.bound, "MM", "The distance, such as the job's --max-error")
+  add("--bound", all.question.bound, "MM",
+      "The distance from the extracted surface, such as the job's --max-error")
       ->required();
   add("--scheme", all.cut.tetrahedra, "5|6", "As in the job")->check(CLI::IsMember({5, 6}));
   add("--crop", all.crop, "X,Y,Z,X,Y,Z", "As in the job; closes")->delimiter(',')->expected(6);

@@ -5,6 +5,6 @@ namespace isomesh::codec {
 
 // A part of the key of a result. Increment whenever the same volume and parameters would give
 // different bytes than before.
-inline constexpr const char* kMesherVersion = "6";
+inline constexpr const char* kMesherVersion = "7";
 
 }  // namespace isomesh::codec

@@ -24,7 +24,7 @@ struct PipelineLimits {
 
 // Increment with codec::kMesherVersion, and whenever jobs can ask for something new: in an upgrade,
 // the older daemons that share the queue leave newer jobs to newer daemons.
-inline constexpr int kJobVersion = 9;
+inline constexpr int kJobVersion = 10;
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the
 // results as data of `owner`. The same volume and parameters give the same bytes. Throws Error
