@@ -204,6 +204,12 @@ void visit(Is<ErrorBudget> auto& self, auto&& field) {
 }
 
 void visit(Is<MeshCertificate> auto& self, auto&& field) {
+  // Records of older servers lack it.
+  std::optional<MeshCertificate::Reference> reference = self.reference;
+  field("reference", reference);
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(self)>>) {
+    self.reference = reference.value_or(MeshCertificate::Reference::kExtracted);
+  }
   field("file", self.file);
   std::optional<bool> proven = self.bound_mm.has_value();
   field("proven", proven);

@@ -230,21 +230,26 @@ struct DistanceSummary {
 
 // The shares of max_error_mm; they add up to it.
 struct ErrorBudget {
-  double smoothing = 0;       // the largest displacement of a vertex
+  double smoothing = 0;       // the largest displacement of a vertex; 0 if the reference has it
   double quantisation = 0;    // the largest rounding error of a file's coordinates
   double simplification = 0;  // the remainder
 
   bool operator==(const ErrorBudget&) const = default;
 };
 
-// The deviation of the files from the surface as extracted, before smoothing.
+// The deviation of the files from a reference.
 struct MeshCertificate {
+  // The surface as extracted, before smoothing; or as it is smoothed, before simplification, in
+  // jobs that simplify labels.
+  enum class Reference { kExtracted, kSmoothed };
+
+  Reference reference = Reference::kExtracted;
   MeshFormat file = MeshFormat::kDrc;            // the file with the largest deviation
   double found_mm = 0;                           // the largest at the samples, in both directions
   std::optional<double> bound_mm = {};           // if proven: no point of any file deviates more
   std::optional<std::string> why_unproven = {};  // otherwise, as a sentence
   DistanceSummary from_mesh;                     // shows what was added
-  DistanceSummary from_extracted;                // shows what was left out
+  DistanceSummary from_extracted;                // from the reference; shows what was left out
   std::optional<ErrorBudget> budget_mm = {};     // if max_error_mm is given
 
   bool operator==(const MeshCertificate&) const = default;

@@ -351,14 +351,15 @@ constinit const Parameter kMaxErrorMm = {
     .name = "max_error_mm",
     .title = "Largest error",
     .help =
-        "The distance between each file and the extracted surface is at "
-        "most this.",
+        "The distance between each file and the extracted surface, or for labels the "
+        "smoothed surface, is at most this.",
     .more =
-        "In millimetres, in both directions. It is proven for every point; "
-        "if that cannot be done, `mesh.certificate` says so. See `certify`, "
-        "which is switched on. Smoothing may use half of it. Simplification then "
-        "removes as many triangles as the rest allows, and Draco's "
-        "coordinates get as many bits as that takes.",
+        "In millimetres, in both directions. At an iso-value, smoothing may use half of "
+        "it. For labels, `max_displacement_mm` limits smoothing. "
+        "Simplification then removes as many triangles as the rest allows, and Draco's "
+        "coordinates get as many bits as that takes. The distance is proven for every "
+        "point; if that cannot be done, `mesh.certificate` says so. See `certify`, "
+        "which is switched on.",
     .unit = "mm",
     .minimum = 0.001,
     .maximum = 1000,
@@ -476,6 +477,9 @@ constinit const Parameter kCertify = {
     .help =
         "Measure how far the files are from the extracted surface, and "
         "where they intersect themselves.",
+    .more =
+        "If `max_error_mm` or `triangles` simplifies labels, the distance counts from the "
+        "smoothed surface instead; `mesh.certificate.reference` names it.",
     .may_be_absent = true};
 
 constinit const Parameter kMinThicknessMm = {

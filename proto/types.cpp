@@ -119,6 +119,13 @@ struct Names<Simplification::Bound> {
                                         std::pair{Simplification::Bound::kTopology, "topology"}};
 };
 
+template <>
+struct Names<MeshCertificate::Reference> {
+  static constexpr std::array kTable = {
+      std::pair{MeshCertificate::Reference::kExtracted, "extracted"},
+      std::pair{MeshCertificate::Reference::kSmoothed, "smoothed"}};
+};
+
 template <class Enum>
 std::string_view name_of(Enum value) {
   for (const auto& [known, name] : Names<Enum>::kTable) {
@@ -208,6 +215,7 @@ ISOMESH_NAMED(JobState)
 ISOMESH_NAMED(Stage)
 ISOMESH_NAMED(WaitingFor)
 ISOMESH_NAMED(Simplification::Bound)
+ISOMESH_NAMED(MeshCertificate::Reference)
 
 #undef ISOMESH_NAMED
 

@@ -292,6 +292,7 @@ std::string_view to_string(JobState value);
 std::string_view to_string(Stage value);
 std::string_view to_string(WaitingFor value);
 std::string_view to_string(Simplification::Bound value);
+std::string_view to_string(MeshCertificate::Reference value);
 
 // The inverse; empty for an unknown name. types.cpp instantiates these templates.
 template <class Enum>

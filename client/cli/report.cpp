@@ -176,15 +176,16 @@ void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
   }
   if (!mesh.certificate) return;
   const MeshCertificate& certificate = *mesh.certificate;
+  const std::string surface = std::string(to_string(certificate.reference)) + " surface";
   if (certificate.bound_mm) {
-    rows.push_back({"proven", "no point of any file or of the extracted surface is more than " +
+    rows.push_back({"proven", "no point of any file or of the " + surface + " is more than " +
                                   in.length(*certificate.bound_mm, 4) + " from the other"});
   } else if (certificate.why_unproven) {
     rows.push_back({"not proven", *certificate.why_unproven});
   }
-  rows.push_back({"certified", in.length(certificate.found_mm, 4) +
-                                   " from the extracted surface, " + "measured on the " +
-                                   std::string(to_string(certificate.file)) + " file"});
+  rows.push_back({"certified", in.length(certificate.found_mm, 4) + " from the " + surface +
+                                   ", measured on the " + std::string(to_string(certificate.file)) +
+                                   " file"});
   rows.push_back({"  from the file", way_of(certificate.from_mesh, in)});
   rows.push_back({"  to the file", way_of(certificate.from_extracted, in)});
   if (certificate.budget_mm) {

@@ -48,10 +48,13 @@ void add_options(CLI::App& app, Arguments& all) {
   const auto add = [&](const char* name, auto& value, const char* type, const char* help) {
     return app.add_option(name, value, help)->type_name(type);
   };
-  add("FILE", all.mesh, "FILE", "The mesh: STL, PLY or GLB, without a codec")->required();
+  add("FILE", all.mesh, "FILE",
+      "The mesh of a job at an iso-value: STL, PLY or GLB, without a codec")
+      ->required();
   add("--volume", all.volume, "FILE", "Its volume: a file, a folder or an archive")->required();
   add("--iso", all.cut.iso, "VALUE", "The iso-value of the job");
-  add("--bound", all.question.bound, "MM", "The distance, such as the job's --max-error");
+  add("--bound", all.question.bound, "MM",
+      "The distance from the extracted surface, such as the job's --max-error");
   add("--scheme", all.cut.tetrahedra, "5|6", "As in the job")->check(CLI::IsMember({5, 6}));
   add("--inside", all.inside, "above|below", "As in the job")
       ->check(CLI::IsMember({"above", "below"}));
@@ -83,8 +86,8 @@ void add_options(CLI::App& app, Arguments& all) {
 
 // Options that are not given follow the job that made the file, if that says so.
 void follow(const MeshParameters& made, const CLI::App& app, Arguments& all) {
-  if (made.labels || made.scheme == SchemeName::kBcc) {
-    throw invalid_parameter("file", "files of labels and of scheme bcc cannot be checked");
+  if (made.scheme == SchemeName::kBcc) {
+    throw invalid_parameter("file", "files of scheme bcc cannot be checked");
   }
   const auto is_open = [&](const char* option) { return app.count(option) == 0; };
   if (is_open("--iso")) all.cut.iso = made.iso.value_or(0);
@@ -108,6 +111,7 @@ int run(const CLI::App& app, Arguments& all) {
   verify::Cut& cut = all.cut;
   const InputFile file = InputFile::chosen(all.mesh);
   const std::string bytes = file.text(0, file.size());
+  verify::Surface mesh = verify::read_surface(bytes);
   const auto made = verify::read_parameters(bytes);
   if (made) follow(*made, app, all);
   const auto require = [&](const char* option, bool is_told) {
@@ -120,7 +124,6 @@ int run(const CLI::App& app, Arguments& all) {
   if (!(all.question.bound > 0) || !std::isfinite(all.question.bound + cut.iso)) {
     throw invalid_parameter("bound", "the bound must be positive, and the iso-value finite");
   }
-  verify::Surface mesh = verify::read_surface(bytes);
   verify::Field field = verify::read_field(all.volume, all.import);
   if (!all.crop.empty()) {
     field = field.cropped({verify::Vec{all.crop[0], all.crop[1], all.crop[2]},

@@ -25,6 +25,13 @@ constexpr std::uint64_t kNone = UINT32_MAX;
   throw Error(ErrorCode::kInvalidParameter, "the mesh cannot be read: " + reason);
 }
 
+// The surface before simplification, from which labels' bounds count, is not made here.
+[[noreturn]] void refuse_labels() {
+  throw Error(ErrorCode::kInvalidParameter,
+              "the mesh is one of labels, which cannot be checked: its bound counts from the "
+              "smoothed surface, and this program has the surface at an iso-value");
+}
+
 template <class T>
 T at(std::string_view bytes, std::size_t offset) {
   T value;
@@ -86,6 +93,7 @@ Surface read_stl(std::string_view bytes) {
 Surface read_ply(std::string_view bytes) {
   constexpr std::string_view kEnd = "end_header\n";
   const std::size_t end = bytes.find(kEnd);
+  if (bytes.substr(0, end).find(" label\n") != bytes.npos) refuse_labels();
   std::string header;
   std::vector<std::uint64_t> counts;
   for (const std::string_view line : lines(bytes.substr(0, end))) {
@@ -155,6 +163,15 @@ std::string_view items(const Json& gltf, std::string_view binary, std::uint64_t 
   return binary.substr(begin, size);
 }
 
+bool is_of_labels(const Json& gltf) {
+  const Json* json = &gltf;
+  for (const char* const name : {"asset", "extras", "parameters", "labels"}) {
+    json = is_object(*json) ? find(*json, name) : nullptr;
+    if (json == nullptr) return false;
+  }
+  return !is_null(*json);
+}
+
 // The first chunk of the file, which is removed with all before it.
 JsonTree take_json(std::string_view& bytes) {
   if (bytes.size() < 12 || at<std::uint32_t>(bytes, 8) != bytes.size()) {
@@ -170,6 +187,7 @@ Surface read_glb(std::string_view bytes) {
   const JsonTree tree = take_json(rest);
   const Json& gltf = tree.root();
   Surface surface;
+  if (is_of_labels(gltf)) refuse_labels();
   if (find(gltf, "extensionsRequired") != nullptr) refuse("the GLB has a codec; ask for none");
   const Json& nodes = existing(item(existing(gltf, "scenes"), 0), "nodes");
   if (array_size(nodes) == 0) return surface;

@@ -152,6 +152,15 @@ std::string told_parameters(MeshParameters parameters, SendFormat format) {
   return std::string(beginning(text, kLongest - kMore.size())) + std::string(kMore);
 }
 
+// The largest distance from the extracted surface: proven, or as it was found. What smoothing moved
+// adds to a distance from the smoothed surface.
+double deviation_mm(const MeshSummary& mesh) {
+  const MeshCertificate& certificate = *mesh.certificate;
+  const double simplified = certificate.bound_mm.value_or(certificate.found_mm);
+  const bool is_smoothed = certificate.reference == MeshCertificate::Reference::kSmoothed;
+  return is_smoothed ? simplified + mesh.displacement_mm.max : simplified;
+}
+
 std::string description_of(const Job& job) {
   const MeshParameters& parameters = job.parameters;
   const std::string what = parameters.labels ? "label"
@@ -160,9 +169,8 @@ std::string description_of(const Job& job) {
   std::string text = what + ", scheme " + std::string(to_string(parameters.scheme)) + ", " +
                      std::to_string(parameters.passes) + " passes";
   // Distance of the object's vertices and triangles from the extracted surface.
-  if (const auto& certificate = job.mesh->certificate) {
-    const double within = certificate->bound_mm.value_or(certificate->found_mm);
-    text += ", within " + number_text(rounded_up(within)) + " mm";
+  if (job.mesh->certificate) {
+    text += ", within " + number_text(rounded_up(deviation_mm(*job.mesh))) + " mm";
   }
   return in_short(text);
 }
@@ -244,7 +252,7 @@ dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
 std::optional<dicom::Deviation> deviation_of(const Job& job) {
   const auto& certificate = job.mesh->certificate;
   if (!certificate) return std::nullopt;
-  return dicom::Deviation{.mm = certificate->bound_mm.value_or(certificate->found_mm),
+  return dicom::Deviation{.mm = deviation_mm(*job.mesh),
                           .is_bound = certificate->bound_mm.has_value()};
 }
 

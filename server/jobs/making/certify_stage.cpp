@@ -43,8 +43,10 @@ SelfIntersections summary_of(const mesh::SelfIntersections& found) {
 
 ErrorBudget budget_of(const MeshParameters& parameters, const mesh::Mesh& mesh,
                       const MeshSummary& summary) {
-  ErrorBudget budget = {.smoothing = summary.displacement_mm.max,
-                        .quantisation = quantisation_mm(parameters, mesh)};
+  ErrorBudget budget = {.quantisation = quantisation_mm(parameters, mesh)};
+  if (error_reference(parameters) == MeshCertificate::Reference::kExtracted) {
+    budget.smoothing = summary.displacement_mm.max;
+  }
   budget.simplification = *parameters.max_error_mm - budget.smoothing - budget.quantisation;
   return budget;
 }
@@ -64,9 +66,8 @@ KeptFiles::KeptFiles(const MeshRequest& request, std::span<const codec::Sink> si
   }
 }
 
-void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
-                   const KeptFiles& files, Progress& progress, const mesh::Mesh& mesh,
-                   MeshSummary& summary) {
+void certify_stage(const MeshRequest& request, const KeptSurface& reference, const KeptFiles& files,
+                   Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
   if (!request.measures.certify) return;
   const MeshParameters& parameters = request.parameters;
   progress.enter(Stage::kCertify);
@@ -79,6 +80,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   constexpr double kDistances = 0.7;  // of the time; the rest is for intersections
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   MeshCertificate& certificate = *summary.certificate;
+  certificate.reference = error_reference(parameters);
   mesh::SelfIntersections crossings;
   const auto count_crossings = [&](const mesh::SurfaceView& surface, const mesh::Context& context) {
     mesh::SelfIntersections found = find_self_intersections(surface, context);
@@ -91,7 +93,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
     }
     const double begin = part * static_cast<double>(i);
     const mesh::Certificate measured =
-        mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
+        mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), reference.view(),
                       stage.part(begin, begin + kDistances * part),
                       certificate.bound_mm ? kMostPointsBesideAProof : mesh::kAllPoints,
                       certificate.bound_mm.value_or(kUnbounded));
@@ -110,10 +112,10 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   if (parameters.max_error_mm) {
     const double largest = std::max(certificate.found_mm, certificate.bound_mm.value_or(0));
     if (largest > *parameters.max_error_mm) {
-      throw Error(ErrorCode::kInternal,
-                  "the " + std::string(to_string(certificate.file)) + " file is " +
-                      number_text(largest) +
-                      " mm from the extracted surface, which is more than max_error_mm");
+      throw Error(ErrorCode::kInternal, "the " + std::string(to_string(certificate.file)) +
+                                            " file is " + number_text(largest) + " mm from the " +
+                                            std::string(to_string(certificate.reference)) +
+                                            " surface, which is more than max_error_mm");
     }
     certificate.budget_mm = budget_of(parameters, mesh, summary);
   }

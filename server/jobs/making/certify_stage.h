@@ -1,4 +1,5 @@
-// The distance of a job's files from the extracted surface; private to this folder.
+// The distance of a job's files from the surface that its error counts from; private to this
+// folder.
 #pragma once
 
 #include <cstddef>
@@ -28,12 +29,12 @@ class KeptFiles {
   std::vector<codec::Sink> sinks_;
 };
 
-// If the job asks for it: measures the distances from the extracted surface, both ways, of each
-// file that rounds coordinates, as other programs decode it; and of the mesh, once for all exact
-// files. Looks for triangles that intersect. `summary` has the labels' files. Throws Error
-// kInternal if a file is not what was encoded or is farther than max_error_mm, and kCancelled.
-void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
-                   const KeptFiles& files, Progress& progress, const mesh::Mesh& mesh,
-                   MeshSummary& summary);
+// If the job asks for it: measures the distances from the surface that error_reference() names,
+// both ways, of each file that rounds coordinates, as other programs decode it; and of the mesh,
+// once for all exact files. Looks for triangles that intersect. `summary` has the labels' files.
+// Throws Error kInternal if a file is not what was encoded or is farther than max_error_mm, and
+// kCancelled.
+void certify_stage(const MeshRequest& request, const KeptSurface& reference, const KeptFiles& files,
+                   Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary);
 
 }  // namespace isomesh::jobs

@@ -34,6 +34,16 @@ double quantisation_of(const codec::Grid& grid) {
 
 }  // namespace
 
+bool is_simplified(const MeshParameters& parameters) {
+  return parameters.max_error_mm || parameters.triangles;
+}
+
+MeshCertificate::Reference error_reference(const MeshParameters& parameters) {
+  using Reference = MeshCertificate::Reference;
+  return parameters.labels && is_simplified(parameters) ? Reference::kSmoothed
+                                                        : Reference::kExtracted;
+}
+
 bool has_rounded_files(const MeshParameters& parameters) {
   return std::ranges::any_of(files_of(parameters),
                              [&](MeshFormat file) { return codec::rounds(file, parameters); });
@@ -55,7 +65,9 @@ mesh::Rounding rounding_of(const MeshParameters& parameters, const mesh::Mesh& m
 double most_displacement(const MeshParameters& parameters) {
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   const double asked = parameters.max_displacement_mm.value_or(kUnbounded);
-  if (!parameters.max_error_mm) return asked;
+  const bool counts_smoothing =
+      error_reference(parameters) == MeshCertificate::Reference::kExtracted;
+  if (!parameters.max_error_mm || !counts_smoothing) return asked;
   return std::min(asked, kSmoothingShare * *parameters.max_error_mm);
 }
 

@@ -10,8 +10,16 @@
 
 namespace isomesh::jobs {
 
-// With `max_error_mm`, smoothing may use half, rounding coordinates a tenth, and simplification the
-// rest.
+// At an iso-value, `max_error_mm` counts from the extracted surface: smoothing may use half,
+// rounding coordinates a tenth, and simplification the rest. For labels it counts from the smoothed
+// surface, because less smoothing would take their volume (docs/labels.md). So simplification has
+// nine tenths.
+
+// True if the job asks for fewer triangles.
+bool is_simplified(const MeshParameters& parameters);
+
+// The surface that the error counts from.
+MeshCertificate::Reference error_reference(const MeshParameters& parameters);
 
 // The farthest that smoothing may move a vertex; infinite if nothing limits it.
 double most_displacement(const MeshParameters& parameters);

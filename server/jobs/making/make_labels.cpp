@@ -191,10 +191,11 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   summary.notes = notes_on_thin_walls(samples, labels, parameters, progress.quiet());
   if (!is_simplified(parameters)) check_disk(size_of(walls.mesh), request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
-  ExtractedSurface extracted(request, walls.mesh);
+  KeptSurface extracted = kept_extracted(request, walls.mesh);
 
   smooth_walls(samples, options, request, progress, walls, summary);
   untangle_stage(parameters, extracted, progress, walls.mesh, summary);
+  const KeptSurface smoothed = kept_smoothed(request, walls.mesh);
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, walls.mesh, &walls, summary);
@@ -216,7 +217,8 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
     encode_all({walls, surfaces, summary.labels, grid ? &*grid : nullptr},
                provenance_of(samples, written), files.sinks(), progress, summary);
   }
-  certify_stage(written, extracted, files, progress, walls.mesh, summary);
+  const bool is_smoothed = error_reference(parameters) == MeshCertificate::Reference::kSmoothed;
+  certify_stage(written, is_smoothed ? smoothed : extracted, files, progress, walls.mesh, summary);
   const auto label = [&](std::size_t n) -> const mesh::Mesh& { return surfaces[n].mesh; };
   thickness_stage(request, labels.size(), label, progress, summary);
   return made;

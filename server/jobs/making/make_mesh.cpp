@@ -33,7 +33,7 @@ bool shows_topology(const MeshParameters& parameters) {
 // Encodes every format and measures the mesh, all in parallel, because few of these tasks keep all
 // threads busy. Measures the topology only if no encoder reports it.
 void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
-                        const ExtractedSurface& extracted, const Progress& progress,
+                        const KeptSurface& extracted, const Progress& progress,
                         const mesh::Mesh& mesh, MeshSummary& summary) {
   const MeshParameters& parameters = provenance.parameters;
   const auto grid = grid_for_distances(parameters, extracted, progress);
@@ -138,7 +138,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   summary.iso = request.iso;
   leave_out_parts(parameters, progress, mesh, summary.dropped);
   if (!is_simplified(parameters)) check_disk(size_of(mesh), request);
-  ExtractedSurface extracted(request, mesh);
+  KeptSurface extracted = kept_extracted(request, mesh);
 
   smooth_stage(samples, request, progress, mesh, summary);
   untangle_stage(parameters, extracted, progress, mesh, summary);

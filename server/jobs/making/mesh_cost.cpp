@@ -133,7 +133,11 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
   const std::uint64_t certifying = static_cast<std::uint64_t>(files) +
                                    (files > 0 ? 3 * mesh_bytes(surface) : 0) +
                                    surface.triangles * kGridsPerTriangle;
-  return mesh_bytes(surface) + std::max({untangling, simplifying, certifying, grid});
+  // The error counts from the smoothed surface, and other distances from the extracted one.
+  const bool keeps_both =
+      parameters.distances && error_reference(parameters) == MeshCertificate::Reference::kSmoothed;
+  return (keeps_both ? 2 : 1) * mesh_bytes(surface) +
+         std::max({untangling, simplifying, certifying, grid});
 }
 
 // The least size of the files.

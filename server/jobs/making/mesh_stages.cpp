@@ -70,13 +70,16 @@ bool simplify_within_error(const SampleArray& samples, const MeshRequest& reques
   return true;
 }
 
-void simplify_checked(const MeshParameters& parameters, const ExtractedSurface& extracted,
+void simplify_checked(const MeshParameters& parameters, const KeptSurface& extracted,
                       const Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
                       MeshSummary& summary) {
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
-    options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);
-    options.before = extracted.positions;
+    const double most = *parameters.max_error_mm;
+    options.max_error_mm = most - quantisation_mm(parameters, mesh);
+    if (error_reference(parameters) == MeshCertificate::Reference::kExtracted) {
+      options.before = extracted.positions;
+    }
   }
   options.triangles = parameters.triangles.value_or(0);
   const mesh::SimplificationEffect effect =
@@ -93,6 +96,11 @@ void simplify_checked(const MeshParameters& parameters, const ExtractedSurface& 
   }
 }
 
+bool measures_error_from(MeshCertificate::Reference reference, const MeshRequest& request) {
+  const bool is_measured = request.measures.certify || request.parameters.max_error_mm;
+  return is_measured && error_reference(request.parameters) == reference;
+}
+
 void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
   summary.area_mm2 = extent.area_mm2;
   summary.volume_mm3.smoothed = extent.volume_mm3;
@@ -101,22 +109,26 @@ void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
 
 }  // namespace
 
-bool is_simplified(const MeshParameters& parameters) {
-  return parameters.max_error_mm || parameters.triangles;
-}
-
-ExtractedSurface::ExtractedSurface(const MeshRequest& request, const mesh::Mesh& mesh) {
+KeptSurface kept_extracted(const MeshRequest& request, const mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
   const bool is_measured =
-      request.measures.certify || parameters.max_error_mm || parameters.distances;
-  if (!is_measured && !parameters.untangle) return;
-  positions.assign(mesh.positions.begin(), mesh.positions.end());
-  if (!is_measured) return;
-  triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
+      parameters.distances || measures_error_from(MeshCertificate::Reference::kExtracted, request);
+  KeptSurface kept;
+  if (!is_measured && !parameters.untangle) return kept;
+  kept.positions.assign(mesh.positions.begin(), mesh.positions.end());
+  if (!is_measured) return kept;
+  kept.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
+  return kept;
+}
+
+KeptSurface kept_smoothed(const MeshRequest& request, const mesh::Mesh& mesh) {
+  if (!measures_error_from(MeshCertificate::Reference::kSmoothed, request)) return {};
+  return {{mesh.positions.begin(), mesh.positions.end()},
+          {mesh.triangles.begin(), mesh.triangles.end()}};
 }
 
 std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& parameters,
-                                                     const ExtractedSurface& extracted,
+                                                     const KeptSurface& extracted,
                                                      const Progress& progress) {
   std::optional<mesh::TriangleGrid> grid;
   if (parameters.distances) grid.emplace(extracted.view(), progress.quiet());
@@ -170,8 +182,8 @@ void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
   conclude_quality(summary);
 }
 
-void untangle_stage(const MeshParameters& parameters, ExtractedSurface& extracted,
-                    Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
+void untangle_stage(const MeshParameters& parameters, KeptSurface& extracted, Progress& progress,
+                    mesh::Mesh& mesh, MeshSummary& summary) {
   if (!parameters.untangle) return;
   progress.enter(Stage::kUntangle);
   mesh::UntangleOptions options = {.extracted = extracted.positions};
@@ -198,7 +210,7 @@ mesh::ExtractOptions extract_options(const MeshParameters& parameters, double is
 }
 
 void simplify_stage(const SampleArray& samples, const MeshRequest& request,
-                    const ExtractedSurface& extracted, Progress& progress, mesh::Mesh& mesh,
+                    const KeptSurface& extracted, Progress& progress, mesh::Mesh& mesh,
                     mesh::SeparatingSurface* walls, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;

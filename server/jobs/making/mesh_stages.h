@@ -25,25 +25,26 @@
 
 namespace isomesh::jobs {
 
-// True if the job asks for fewer triangles.
-bool is_simplified(const MeshParameters& parameters);
-
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso);
 
-// A copy of the extracted surface, if something is measured from it later; otherwise empty. Only
-// the positions if vertices move back to them (untangle_stage), and no more.
-struct ExtractedSurface {
+// A copy of a surface, which later stages change; empty if nothing needs it.
+struct KeptSurface {
   std::vector<mesh::Vec3> positions;
   std::vector<mesh::Triangle> triangles;
-
-  ExtractedSurface(const MeshRequest& request, const mesh::Mesh& mesh);
 
   mesh::SurfaceView view() const { return {positions, triangles}; }
 };
 
+// The extracted surface, if something is measured from it. Only the positions if vertices move back
+// to them (untangle_stage), and no more.
+KeptSurface kept_extracted(const MeshRequest& request, const mesh::Mesh& mesh);
+
+// The smoothed and untangled surface, if the error is measured from it.
+KeptSurface kept_smoothed(const MeshRequest& request, const mesh::Mesh& mesh);
+
 // The extracted surface for files that hold distances; empty if none does.
 std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& parameters,
-                                                     const ExtractedSurface& extracted,
+                                                     const KeptSurface& extracted,
                                                      const Progress& progress);
 
 // Smooths the mesh. Writes the effect and the quality of the triangles before into the summary, and
@@ -69,14 +70,15 @@ void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& me
 // Moves vertices back towards their extracted positions until the smoothed mesh does not intersect
 // itself, if the parameters ask for it, and writes the result into the summary. Frees the extracted
 // positions if nothing is measured from them.
-void untangle_stage(const MeshParameters& parameters, ExtractedSurface& extracted,
-                    Progress& progress, mesh::Mesh& mesh, MeshSummary& summary);
+void untangle_stage(const MeshParameters& parameters, KeptSurface& extracted, Progress& progress,
+                    mesh::Mesh& mesh, MeshSummary& summary);
 
 // Simplifies the mesh if the parameters ask for it, and writes the result into the summary. `walls`
 // is the owner of the mesh, if it has one. The parameters have the bits of the files' coordinates.
-// The distance is proven for every point if possible (bound.h), and measured otherwise.
+// The distance from the surface that error_reference() names is proven for every point if possible
+// (bound.h), and measured otherwise.
 void simplify_stage(const SampleArray& samples, const MeshRequest& request,
-                    const ExtractedSurface& extracted, Progress& progress, mesh::Mesh& mesh,
+                    const KeptSurface& extracted, Progress& progress, mesh::Mesh& mesh,
                     mesh::SeparatingSurface* walls, MeshSummary& summary);
 
 // Measures the triangles after smoothing and simplification, unless there was neither.

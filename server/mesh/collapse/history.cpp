@@ -17,10 +17,13 @@ bool is_left(const Triangle& corners) {
 
 History::History(std::size_t vertices) : into_(vertices, kNone), step_(vertices, kNone) {}
 
+std::uint32_t History::kept(std::uint32_t vertex) const {
+  while (into_[vertex] != kNone) vertex = into_[vertex];
+  return vertex;
+}
+
 Triangle History::corners_of(Triangle original) const {
-  for (std::uint32_t& corner : original) {
-    while (into_[corner] != kNone) corner = into_[corner];
-  }
+  for (std::uint32_t& corner : original) corner = kept(corner);
   return original;
 }
 

@@ -36,6 +36,9 @@ class History {
   std::vector<std::uint32_t> undo(std::span<const Triangle> originals,
                                   std::span<const std::uint32_t> which, std::size_t count);
 
+  // The vertex that a vertex has become; itself if it is left.
+  std::uint32_t kept(std::uint32_t vertex) const;
+
   // The corners that a triangle has now; two are the same if it is gone.
   Triangle corners_of(Triangle original) const;
 

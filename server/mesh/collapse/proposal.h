@@ -19,6 +19,7 @@ struct Proposal {
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> numbers;  // of each: that of the original triangle that became it
   collapse::History history;
+  std::vector<Vec3> places = {};  // of the original vertices, where they have moved to
 };
 
 // The surface as it was, from which the error is measured.

@@ -1,10 +1,11 @@
 // Fewer triangles for a surface, within a distance of it.
 //
 // Edges collapse in the order of their quadrics (M. Garland, P. S. Heckbert, "Surface
-// simplification using quadric error metrics", SIGGRAPH 1997). A vertex is drawn into a neighbour,
-// so vertices are removed but never moved. A quadric is no distance. So before each collapse some
-// points are measured against the original surface in both directions, and the link condition is
-// checked. In the end all points are looked at (misses.h).
+// simplification using quadric error metrics", SIGGRAPH 1997). A vertex is drawn into a neighbour.
+// A quadric is no distance. So before each collapse some points are measured against the original
+// surface in both directions, and the link condition is checked. Then the vertices that are left
+// move so that the surface keeps its volume (kept_volume.h). In the end all points are looked at
+// (misses.h), and vertices move back where that is needed.
 #pragma once
 
 #include <cstdint>
@@ -40,13 +41,14 @@ struct SimplificationEffect {
   bool is_within = false;
 };
 
-// Simplifies the mesh in place. The remaining vertices keep their order and positions. All boundary
-// vertices are kept, and all of Mesh::on_line if no walls are given. An oriented manifold stays
-// one, with the same boundary, Euler characteristic and orientation. No two triangles lie back to
-// back, so a closed surface has at least four. No triangle loses its area. None that changed
-// intersects another one, unless there is no error and only so the target can be reached. The
-// layers are joined into fewer, deeper ones, so that a triangle names vertices of at most two.
-// Encoders walk along these layers.
+// Simplifies the mesh in place. The remaining vertices keep their order. All boundary vertices are
+// kept where they are, those of caps stay where they are, and all of Mesh::on_line are kept if no
+// walls are given. The others move where the volume needs it. An oriented manifold stays one, with
+// the same boundary, Euler characteristic and orientation. No two triangles lie back to back, so a
+// closed surface has at least four. No triangle loses its area. None that changed intersects
+// another one, unless there is no error and only so the target can be reached. The layers are
+// joined into fewer, deeper ones, so that a triangle names vertices of at most two. Encoders walk
+// along these layers.
 //
 // Takes some 100 bytes a triangle beside the mesh, and what TriangleGrid takes. The same mesh for
 // any number of threads. Throws Error kUnusableVolume where a position is not a finite number,

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/mesh/collapse/kept_volume.h"
 #include "server/mesh/collapse/misses.h"
 #include "server/mesh/collapse/proposal.h"
 #include "server/mesh/collapse/simplify.h"
@@ -19,11 +20,15 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr int kMostRepairs = 24;
+constexpr int kMostMoves = 6;  // rounds that only move vertices back
 constexpr int kMostProposals = 4;
 
 bool is_left(const Triangle& corners) {
   return corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0];
 }
+
+// Moved vertices go half of the way back, and then all of it.
+constexpr std::uint8_t kMostPulls = 2;
 
 // Some triangles of a surface, those that are left of collapses and near marked cubes, if any.
 class Part {
@@ -50,9 +55,10 @@ class Part {
   std::vector<WallSides> sides_;
 };
 
-// Looks at all points of a proposal, and of the original surface, and undoes collapses where one is
-// beyond the error, if there is one, or where a triangle that they changed intersects another one.
-// From the second round on, it only looks at what may have changed.
+// Looks at all points of a proposal, and of the original surface. Where one is beyond the error, if
+// there is one, or where a triangle that changed intersects another one, it moves vertices back,
+// and undoes collapses once all vertices there are back. From the second round on, it only looks at
+// what may have changed.
 class Checker {
  public:
   Checker(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
@@ -66,15 +72,28 @@ class Checker {
   // Returns true if all points are within the error then.
   bool repair(Proposal& proposal) {
     begin(proposal);
-    for (int round = 0;; ++round) {
+    int moves = 0;
+    for (int round = 0;;) {
       context_.throw_if_stopped();
       find_faults();
       if ((faults_.empty() && lost_.empty()) || round == kMostRepairs) break;
+      // Collapses may be no fault where only a moved vertex is.
+      if (moves++ < kMostMoves && change(0, proposal.history)) continue;
       // More at a time later, so that nothing is left to undo in the end.
-      undo(std::size_t{1} << (round / 2), proposal.history);
+      change(std::size_t{1} << (round++ / 2), proposal.history);
     }
     take(proposal);
     return grids_ != nullptr && lost_.empty() && !is_beyond_;
+  }
+
+  // Undoes no collapse. Triangles that intersect without moved vertices do so afterwards.
+  void move_back(Proposal& proposal) {
+    begin(proposal);
+    do {
+      context_.throw_if_stopped();
+      find_faults();
+    } while (change(0, proposal.history));
+    take(proposal);
   }
 
  private:
@@ -87,10 +106,13 @@ class Checker {
     std::ranges::sort(fresh_);
     doubtful_.resize(corners_.size());
     std::iota(doubtful_.begin(), doubtful_.end(), 0U);
+    places_ = proposal.places;
+    pulls_.assign(places_.size(), 0);
     is_first_ = true;
   }
 
   void take(Proposal& proposal) const {
+    proposal.places = places_;
     proposal.numbers.clear();
     proposal.triangles.clear();
     for (std::uint32_t t = 0; t < corners_.size(); ++t) {
@@ -101,8 +123,11 @@ class Checker {
   }
 
   void find_faults() {
-    const WalledSurface left = {{mesh_.positions.span(), corners_}, original_.sides};
+    const WalledSurface left = {{places_, corners_}, original_.sides};
     faults_.clear();
+    for (const std::uint32_t t : fresh_) {
+      if (collapse::is_turned(mesh_, places_, corners_[t])) faults_.push_back(t);
+    }
     find_crossings(left);
     if (grids_ != nullptr) {
       const auto added = find_misses(left, fresh_, *grids_, within_mm_, context_);
@@ -119,7 +144,7 @@ class Checker {
     const Part part(left, fresh ? &*fresh : nullptr);
     for (const std::uint32_t n : find_intersecting_triangles(part.surface().view, context_)) {
       const std::uint32_t t = part.number(n);
-      if (corners_[t] != mesh_.triangles[t]) faults_.push_back(t);
+      if (corners_[t] != mesh_.triangles[t] || has_moved(corners_[t])) faults_.push_back(t);
     }
   }
 
@@ -144,16 +169,43 @@ class Checker {
     return MarkedCubes(boxes, reach_mm);
   }
 
-  void undo(std::size_t count, collapse::History& history) {
-    std::vector<std::uint32_t> which = faults_;
-    which.insert(which.end(), lost_.begin(), lost_.end());
+  bool has_moved(std::uint32_t vertex) const { return places_[vertex] != mesh_.positions[vertex]; }
+  bool has_moved(const Triangle& corners) const {
+    return std::ranges::any_of(corners, [&](std::uint32_t v) { return has_moved(v); });
+  }
+
+  // Moves vertices of faulty triangles back; returns true if there were any. Undoes the last
+  // `count` collapses of those without moved vertices.
+  bool change(std::size_t count, collapse::History& history) {
+    std::vector<std::uint32_t> which;
+    std::vector<std::uint8_t> is_pulled(places_.size(), 0);
+    const auto sort_out = [&](std::uint32_t t, const Triangle& corners) {
+      if (!has_moved(corners)) return which.push_back(t);
+      for (const std::uint32_t v : corners) is_pulled[v] = has_moved(v) ? 1 : 0;
+    };
+    for (const std::uint32_t t : faults_) sort_out(t, corners_[t]);
+    for (const std::uint32_t t : lost_) sort_out(t, history.corners_of(mesh_.triangles[t]));
+    const bool are_any_moved = std::ranges::find(is_pulled, 1) != is_pulled.end();
+    if (count == 0 && !are_any_moved) return false;
     std::vector<Box> changed;
     const auto note = [&](std::uint32_t t) {
-      if (is_left(corners_[t])) changed.push_back(box_of(mesh_, corners_[t]));
+      if (is_left(corners_[t])) changed.push_back(box_of({places_, corners_}, corners_[t]));
     };
-    fresh_ = history.undo(mesh_.triangles.span(), which, count);
+    fresh_.clear();
+    if (count > 0 && !which.empty()) {
+      fresh_ = history.undo(mesh_.triangles.span(), which, count);
+    }
+    for (std::uint32_t t = 0; t < corners_.size(); ++t) {
+      const auto& [a, b, c] = corners_[t];
+      const bool is_moved =
+          is_left(corners_[t]) && (is_pulled[a] | is_pulled[b] | is_pulled[c]) != 0;
+      if (is_moved) fresh_.push_back(t);
+    }
+    for (const std::uint32_t t : fresh_) note(t);
+    for (std::uint32_t v = 0; v < is_pulled.size(); ++v) {
+      if (is_pulled[v] != 0) pull(v);
+    }
     for (const std::uint32_t t : fresh_) {
-      note(t);
       corners_[t] = history.corners_of(mesh_.triangles[t]);
       note(t);
     }
@@ -161,7 +213,7 @@ class Checker {
     std::ranges::sort(fresh_);
     fresh_.erase(std::unique(fresh_.begin(), fresh_.end()), fresh_.end());
     std::erase_if(fresh_, [&](std::uint32_t t) { return !is_left(corners_[t]); });
-    if (grids_ == nullptr) return;
+    if (grids_ == nullptr) return are_any_moved;
     const MarkedCubes near_changed(changed, within_mm_);
     doubtful_.clear();
     for (std::uint32_t t = 0; t < corners_.size(); ++t) {
@@ -169,6 +221,16 @@ class Checker {
       if (near_changed.are_near(box) || std::ranges::binary_search(lost_, t)) {
         doubtful_.push_back(t);
       }
+    }
+    return are_any_moved;
+  }
+
+  void pull(std::uint32_t vertex) {
+    const Vec3& own = mesh_.positions[vertex];
+    const bool is_last = ++pulls_[vertex] == kMostPulls;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      places_[vertex][axis] =
+          is_last ? own[axis] : own[axis] + (places_[vertex][axis] - own[axis]) / 2;
     }
   }
 
@@ -179,6 +241,8 @@ class Checker {
   const WallGrids* const grids_;  // of it, if the error is measured
   // By number of the original triangle, which tells its wall, too.
   std::vector<Triangle> corners_;        // what is left of it
+  std::vector<Vec3> places_;             // of the vertices, by number
+  std::vector<std::uint8_t> pulls_;      // how often each vertex was moved back
   std::vector<std::uint32_t> fresh_;     // of what is left: to look at
   std::vector<std::uint32_t> doubtful_;  // of the original: to look at
   std::vector<std::uint32_t> faults_;    // of what is left: beyond the error or across another one
@@ -201,15 +265,19 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
   Checker checker(options, quiet, mesh, original);
   SimplifyOptions asked = options;
   std::optional<Proposal> first;  // as it was proposed, where only the number counts
+  const auto as_proposed = [&](Proposal proposal) {
+    checker.move_back(proposal);
+    return proposal;
+  };
   for (int attempt = 1;; ++attempt) {
     const Context part = context.part(1 - std::pow(0.5, attempt - 1), 1 - std::pow(0.5, attempt));
     Proposal proposal = propose(asked, part, mesh, walls, original);
     SimplificationEffect& effect = proposal.effect;
     const bool was_reached = effect.reached_triangles;
-    if (!grids && !was_reached) return first ? std::move(*first) : std::move(proposal);
-    if (!grids && !first) {
-      first = {effect, proposal.triangles, proposal.numbers, collapse::History()};
-    }
+    proposal.places = collapse::places_with_volume(mesh, surface.sides, proposal.history,
+                                                   options.max_error_mm, quiet);
+    if (!grids && !was_reached) return as_proposed(std::move(first ? *first : proposal));
+    if (!grids && !first) first = proposal;
     effect.is_within = checker.repair(proposal);
     effect.triangles_after = proposal.triangles.size();
     if (options.triangles == 0) return proposal;
@@ -219,7 +287,7 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
     const std::uint64_t more = effect.triangles_after - options.triangles;
     const bool is_too_far = !grids && more > options.triangles / 2;
     if (attempt == kMostProposals || is_too_far) {
-      return first ? std::move(*first) : std::move(proposal);
+      return first ? as_proposed(std::move(*first)) : std::move(proposal);
     }
     asked.triangles -= std::min(asked.triangles - 1, more + more / 4 + 1);
   }
@@ -236,6 +304,7 @@ SimplificationEffect simplify(const SimplifyOptions& options, const Context& con
   if (mesh.triangles.size() == 0) return {};
   Proposal proposal = propose_and_repair(options, context, mesh, walls);
   context.throw_if_stopped();
+  std::ranges::copy(proposal.places, mesh.positions.begin());
   std::vector<WallSides> sides;
   if (walls != nullptr) {
     for (const std::uint32_t number : proposal.numbers) sides.push_back(walls->sides[number]);

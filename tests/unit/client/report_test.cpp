@@ -206,6 +206,10 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
               HasSubstr("untangled           1,200 pairs of triangles; 3,400 vertices moved "
                         "back\n                      1 pair of triangles intersect as "
                         "extracted\n"));
+  mesh.certificate->bound_mm = 0.1;
+  mesh.certificate->reference = MeshCertificate::Reference::kSmoothed;
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("no point of any file or of the smoothed surface is "));
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("0.0988 mm from the smoothed surface, measured on"));
   mesh.simplified->bound_by = Simplification::Bound::kTopology;
   EXPECT_THAT(mesh_report(mesh), HasSubstr("bound by the topology: fewer triangles would open"));
 }

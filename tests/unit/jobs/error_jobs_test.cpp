@@ -89,6 +89,7 @@ TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
     ASSERT_TRUE(mesh.certificate);
     ASSERT_TRUE(mesh.simplified);
     ASSERT_TRUE(mesh.certificate->bound_mm) << mesh.certificate->why_unproven.value_or("");
+    EXPECT_EQ(mesh.certificate->reference, MeshCertificate::Reference::kExtracted);
     EXPECT_LE(*mesh.certificate->bound_mm, error);
     EXPECT_GE(*mesh.certificate->bound_mm, mesh.certificate->found_mm);
     EXPECT_EQ(mesh.simplified->triangles_before, reference.triangles.size());

@@ -429,5 +429,45 @@ TEST_F(LabelJobsTest, TakeNoMoreMemoryThanTheyMay) {
   EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
 }
 
+// A bound on the distance must not forbid the smoothing that gives labels their volume.
+TEST_F(LabelJobsTest, CountTheirErrorFromTheSmoothedSurface) {
+  auto samples = test::sample<std::uint8_t>(test::scaled(test::sphere({14.3, 14, 13.8}, 10), 99, 0),
+                                            {29, 29, 29});
+  for (std::uint8_t& sample : samples.samples) sample = sample > 0 ? 1 : 0;
+  const Volume volume = add(samples, SampleType::kUint8);
+  JobParameters parameters = label_parameters({});
+  parameters.close = true;
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kGlb};
+  parameters.certify = true;
+  const MeshSummary whole = run(volume, settled(volume, parameters)).mesh;
+  EXPECT_EQ(whole.certificate.value().reference, MeshCertificate::Reference::kExtracted);
+  for (const double error : {0.25, 0.5, 1.0}) {
+    parameters.max_error_mm = error;
+    const MeshSummary mesh = run(volume, settled(volume, parameters)).mesh;
+    // As far as without a bound.
+    EXPECT_EQ(mesh.displacement_mm.max, whole.displacement_mm.max);
+    EXPECT_LT(mesh.triangles, whole.triangles / 3);
+    const LabelSummary& label = mesh.labels.at(0);
+    EXPECT_NEAR(label.volume_mm3, label.voxels_mm3, 0.01 * error * label.voxels_mm3);
+    const MeshCertificate& certificate = mesh.certificate.value();
+    EXPECT_EQ(certificate.reference, MeshCertificate::Reference::kSmoothed);
+    ASSERT_TRUE(certificate.bound_mm) << certificate.why_unproven.value_or("");
+    EXPECT_LE(*certificate.bound_mm, error);
+    EXPECT_LE(certificate.found_mm, *certificate.bound_mm);
+    const ErrorBudget& budget = certificate.budget_mm.value();
+    EXPECT_EQ(budget.smoothing, 0);
+    EXPECT_NEAR(budget.simplification + budget.quantisation, error, 1e-12);
+  }
+  parameters.max_displacement_mm = 0.1;
+  EXPECT_LE(run(volume, settled(volume, parameters)).mesh.displacement_mm.max, 0.1);
+  parameters.max_displacement_mm.reset();
+  parameters.max_error_mm.reset();
+  parameters.triangles = whole.triangles / 10;
+  const MeshSummary few = run(volume, settled(volume, parameters)).mesh;
+  EXPECT_EQ(few.certificate.value().reference, MeshCertificate::Reference::kSmoothed);
+  EXPECT_NEAR(few.labels.at(0).volume_mm3, few.labels.at(0).voxels_mm3,
+              0.005 * few.labels.at(0).voxels_mm3);
+}
+
 }  // namespace
 }  // namespace isomesh::jobs

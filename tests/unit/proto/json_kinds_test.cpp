@@ -102,6 +102,7 @@ Job certified_job() {
   mesh.thickness = {.thinnest_mm = 0.3, .place = {{1, 2, 3}}, .thin_area_mm2 = 12};
   mesh.notes = {note_of(NoteCode::kThinWalls, "One cavity is open.")};
   mesh.certificate.emplace();
+  mesh.certificate->reference = MeshCertificate::Reference::kSmoothed;
   mesh.certificate->file = MeshFormat::k3mf;
   mesh.certificate->found_mm = 0.09;
   mesh.certificate->bound_mm = 0.1;
@@ -125,6 +126,16 @@ TEST(JobJson, MayLackTimesOfStagesThatAreNotAlwaysRun) {
   EXPECT_EQ(job_from_json(text.dump()), job);
   text["timing"].erase("smooth");
   EXPECT_THROW(job_from_json(text.dump()), Error);
+}
+
+// Older servers measured each error from the extracted surface.
+TEST(JobJson, MayLackTheReferenceOfTheError) {
+  Job job = certified_job();
+  json text = json::parse(to_json(job));
+  EXPECT_EQ(text["mesh"]["certificate"]["reference"], "smoothed");
+  EXPECT_EQ(text["mesh"]["certificate"].erase("reference"), 1U);
+  job.mesh->certificate->reference = MeshCertificate::Reference::kExtracted;
+  EXPECT_EQ(job_from_json(text.dump()), job);
 }
 
 TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {

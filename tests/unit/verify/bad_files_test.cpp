@@ -124,5 +124,16 @@ TEST(VerifyFiles, WithACodecAreErrors) {
   EXPECT_THAT(why(made(balls(), parameters)), HasSubstr("has a codec; ask for none"));
 }
 
+// Their bound counts from another surface than the one at an iso-value.
+TEST(VerifyFiles, OfLabelsSayThatTheyCannotBeChecked) {
+  const std::string ply = replaced(file_in(MeshFormat::kPly), "property float z\n",
+                                   "property float z\nproperty uint label\n");
+  EXPECT_THAT(why(ply), HasSubstr("of labels, which cannot be checked"));
+  const std::string glb = replaced(file_in(MeshFormat::kGlb), "\"interpolation\":\"linear\"",
+                                   "\"labels\":\"all\"          ");
+  EXPECT_THAT(why(glb), HasSubstr("of labels, which cannot be checked"));
+  EXPECT_EQ(why(file_in(MeshFormat::kGlb)), "");
+}
+
 }  // namespace
 }  // namespace isomesh::test

@@ -145,7 +145,7 @@ def _mesh_of(run: Run, made: Any, job: Any, notes: List[Any]) -> Mesh:
     if job["mesh"].get("certificate"):
         # The rest is measured on files. What is proven holds for the arrays as well.
         of_files = job["mesh"]["certificate"]
-        job["mesh"]["certificate"] = {name: of_files[name] for name in ("proven", "bound_mm", "why_unproven") if name in of_files}
+        job["mesh"]["certificate"] = {name: of_files[name] for name in ("reference", "proven", "bound_mm", "why_unproven") if name in of_files}
     vertices = run.array(made.vertices, points, "float32", 3)
     return Mesh(vertices, run.array(made.triangles, faces, "uint32", 3), labels, "lps", job, notes, None, colors)
 

@@ -500,11 +500,12 @@ class JobOptions(_Parameters, total=False):
         surface: close is true.
 
     max_error_mm
-        The distance between each file and the extracted surface is at most this. In
-        millimetres, in both directions. It is proven for every point; if that cannot be done,
-        mesh.certificate says so. See certify, which is switched on. Smoothing may use half of
-        it. Simplification then removes as many triangles as the rest allows, and Draco's
-        coordinates get as many bits as that takes.
+        The distance between each file and the extracted surface, or for labels the smoothed
+        surface, is at most this. In millimetres, in both directions. At an iso-value, smoothing
+        may use half of it. For labels, max_displacement_mm limits smoothing. Simplification
+        then removes as many triangles as the rest allows, and Draco's coordinates get as many
+        bits as that takes. The distance is proven for every point; if that cannot be done,
+        mesh.certificate says so. See certify, which is switched on.
 
     triangles
         Simplify the surface to at most this many triangles. If max_error_mm is given too, the
@@ -560,7 +561,8 @@ class JobOptions(_Parameters, total=False):
 
     certify
         Measure how far the files are from the extracted surface, and where they intersect
-        themselves.
+        themselves. If max_error_mm or triangles simplifies labels, the distance counts from the
+        smoothed surface instead; mesh.certificate.reference names it.
 
     min_thickness_mm
         Measure how thick walls are, and the area of those that are thinner than this, such as
@@ -789,7 +791,7 @@ class Thickness(TypedDict):
 class MeshCertificateBudgetMm(TypedDict):
     """How max_error_mm was divided among three causes."""
 
-    #: The largest movement of a vertex by smoothing.
+    #: The largest movement of a vertex by smoothing. 0 if the reference is the smoothed surface.
     smoothing: float
     #: The remaining error.
     simplification: float
@@ -798,29 +800,34 @@ class MeshCertificateBudgetMm(TypedDict):
 
 
 class MeshCertificate(TypedDict):
-    """The distance between the files and the extracted surface, before smoothing. Only for a
-    job with certify. The bytes of drc and glb, which round coordinates, are decoded by an
-    independent reader. All other formats hold the mesh exactly, so the mesh is measured once
-    for all of them. The distance is measured at all vertices and at the centres of all
-    triangles. It is the exact distance from each point to the triangles of the other surface.
-    Distances are stored in single precision."""
+    """The distance between the files and the surface that reference names. Only for a job with
+    certify. The bytes of drc and glb, which round coordinates, are decoded by an independent
+    reader. All other formats hold the mesh exactly, so the mesh is measured once for all of
+    them. The distance is measured at all vertices and at the centres of all triangles. It is
+    the exact distance from each point to the triangles of the other surface. Distances are
+    stored in single precision."""
 
+    #: The surface that the distances count from. extracted: before smoothing. smoothed: after
+    #: smoothing and untangling, before simplification, for a job that simplifies labels. Then
+    #: displacement_mm has how far smoothing moved the vertices, so bound_mm and its max together
+    #: bound the distance from the extracted surface.
+    reference: Literal['extracted', 'smoothed']
     #: The file with the largest distance. The distances are those of this file. Of several files
     #: that hold the mesh exactly, the first.
     file: MeshFormat
     #: Whether bound_mm was proven for every point. If not, why_unproven says why, and other points
     #: can be farther than found_mm.
     proven: bool
-    #: No point of any file is farther from the extracted surface, and no point of the extracted
+    #: No point of any file is farther from the reference surface, and no point of the reference
     #: surface is farther from any file. At most max_error_mm. Only if it was proven.
     bound_mm: NotRequired[float]
     #: Why the distance was measured and not proven.
     why_unproven: NotRequired[str]
     #: The largest distance that was found, in both directions.
     found_mm: float
-    #: From the file to the extracted surface. Shows what was added.
+    #: From the file to the reference surface. Shows what was added.
     from_mesh: DistanceSummary
-    #: From the extracted surface to the file. Shows what was removed.
+    #: From the reference surface to the file. Shows what was removed.
     from_extracted: DistanceSummary
     budget_mm: NotRequired[MeshCertificateBudgetMm]
 

@@ -41,7 +41,20 @@ function chart({ from_mesh: mesh, from_extracted: extracted, found_mm: most }: C
   ]);
 }
 
-function bothWays({ from_mesh: mesh, from_extracted: extracted }: Certificate): HTMLElement {
+// The surface that distances count from.
+export function referenceText({ reference }: Pick<Certificate, 'reference'>): string {
+  return `${reference} surface`;
+}
+
+// How far the mesh is from the extracted surface: proven, or as it was found. What smoothing moved adds to a distance from the smoothed surface.
+export function fromExtracted(mesh: Pick<MeshSummary, 'certificate' | 'displacement_mm'>): { mm: number; proven: boolean } | null {
+  const { certificate, displacement_mm: moved } = mesh;
+  if (!certificate) return null;
+  const { bound_mm: bound, found_mm: found, reference } = certificate;
+  return { mm: (bound ?? found) + (reference === 'smoothed' ? moved.max : 0), proven: typeof bound === 'number' };
+}
+
+function bothWays({ from_mesh: mesh, from_extracted: extracted, reference }: Certificate): HTMLElement {
   const row = (name: string, title: string, distances: DistanceSummary): HTMLElement =>
     h('tr', { title }, [
       h('th', { scope: 'row' }, name),
@@ -55,8 +68,8 @@ function bothWays({ from_mesh: mesh, from_extracted: extracted }: Certificate): 
       h('th', { scope: 'col' }, 'mm'),
       ...['largest', '99th percentile', 'mean'].map((name) => h('th.number', { scope: 'col' }, name)),
     ]),
-    row('from the file', 'From the file to the extracted surface; shows what was added', mesh),
-    row('to the file', 'From the extracted surface to the file; shows what was left out', extracted),
+    row('from the file', `From the file to the ${referenceText({ reference })}; shows what was added`, mesh),
+    row('to the file', `From the ${referenceText({ reference })} to the file; shows what was left out`, extracted),
   ]);
 }
 
@@ -87,13 +100,15 @@ export function certificateBody(job: Job): HTMLElement | null {
   return h('div.certificate', [
     h('p', [
       h('b', `${millimetres(certificate.found_mm)} mm`),
-      ` is the largest distance that was found between the ${file} file and the extracted surface.`,
+      ` is the largest distance that was found between the ${file} file and the ${referenceText(certificate)}.`,
       isOne ? '' : ' Every other file is at least as near.',
       typeof allowed === 'number' ? ` Allowed: ${formatValue(allowed)} mm.` : '',
     ]),
     typeof certificate.bound_mm === 'number'
-      ? h('p', 'Proven: no point of any file or of the extracted surface is more than ', h('b', `${millimetres(certificate.bound_mm)} mm`), ' from the other.')
+      ? h('p', `Proven: no point of any file or of the ${referenceText(certificate)} is more than `, h('b', `${millimetres(certificate.bound_mm)} mm`), ' from the other.')
       : h('p.hint', `Measured at points, not proven for all. ${certificate.why_unproven ?? ''}`),
+    certificate.reference === 'smoothed' &&
+      h('p.hint', `Smoothing moved vertices by at most ${millimetres(job.mesh?.displacement_mm.max ?? 0)} mm from the extracted surface before.`),
     bothWays(certificate),
     chart(certificate),
     spent(certificate, allowed),

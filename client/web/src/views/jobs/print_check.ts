@@ -3,7 +3,7 @@ import type { Job, MeshSummary, Vec3 } from '../../api/types';
 import { isForPrinter, nozzle } from '../../job/printing';
 import { isByLabels } from '../../job/table';
 import { makeVariant } from '../../job/variants';
-import { noVolumeText, otherSide, thinnestText } from './certificate';
+import { fromExtracted, noVolumeText, otherSide, thinnestText } from './certificate';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNumber, formatSize, meshFormatTitle, millimetres } from '../../ui/format';
 
@@ -38,14 +38,14 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
   const make = makeVariant(job);
   const remedy = (text: string, title: string, ...[changes]: Parameters<typeof make>): HTMLElement =>
     button(text, () => make(changes), { class: 'link', title });
-  const { closed, encloses_volume: isSolid, self_intersections: crossings } = mesh.quality;
-  const { certificate, components } = mesh;
+  const { closed, encloses_volume: isSolid, oriented, self_intersections: crossings } = mesh.quality;
+  const { components } = mesh;
 
   const points = [
     isSolid
       ? point('good', 'Closed: it has an inside.')
       : closed
-      ? point('bad', `Volume ${noVolumeText(mesh.quality)}. `, otherSide(job, make))
+      ? point('bad', `Volume ${noVolumeText(mesh.quality)}. `, oriented && otherSide(job, make))
       : point('bad', `Open at ${formatCount(mesh.boundary_edges)} edges. `, !parameters.close && remedy('Close it', 'Starts a job that closes the surface', { close: true })),
   ];
   if (components === 1) points.push(point('good', 'One connected component.'));
@@ -62,12 +62,12 @@ export function printCheck(job: Job, show: (places: readonly Vec3[]) => void): H
         parameters.passes > 0 && !parameters.untangle && remedy('Untangle them', 'Starts a job that moves triangles back where smoothing made them cross', { untangle: true })),
     );
   } else if (crossings) points.push(point('good', 'No triangle crosses another one.'));
-  if (certificate) {
-    const { bound_mm: bound, found_mm: found } = certificate;
+  const distance = fromExtracted(mesh);
+  if (distance) {
     points.push(
-      typeof bound === 'number'
-        ? point('good', `Nowhere more than ${millimetres(bound)} mm from the scan. This is proven.`)
-        : point('told', `Up to ${millimetres(found)} mm from the scan, as measured at points. This is not proven.`),
+      distance.proven
+        ? point('good', `Nowhere more than ${millimetres(distance.mm)} mm from the scan. This is proven.`)
+        : point('told', `Up to ${millimetres(distance.mm)} mm from the scan, as measured at points. This is not proven.`),
     );
   }
   const measure = (width: number): HTMLElement => remedy('Measure them', 'Starts a job that finds walls below the width of your nozzle', { min_thickness_mm: width });
