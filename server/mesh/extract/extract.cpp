@@ -167,11 +167,11 @@ SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& opti
 template <class T>
 SignRows sign_rows(const Lattice<T>& lattice, const ExtractOptions& options) {
   SignRows signs = {.dims = lattice.dims, .classify = {}};
-  const auto smallest = smallest_inside<T>(options.iso);
-  if (!smallest) return signs;
+  const auto threshold = threshold_of<T>(options);
+  if (!threshold) return signs;
   ExtractOptions open = options;
   open.close = false;
-  const std::shared_ptr<const SampleRows> rows = make_sample_rows(lattice, open, *smallest);
+  const std::shared_ptr<const SampleRows> rows = make_sample_rows(lattice, open, *threshold);
   signs.classify = [rows](std::uint32_t y, std::uint32_t z, std::uint64_t* out) {
     rows->classify(y, z, out);
   };
