@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "proto/error.h"
 #include "proto/samples.h"
@@ -37,39 +38,94 @@ Place place_of(const Geometry& geometry, const std::array<double, 3>& index) {
   return place;
 }
 
+// A window of slices is read at once: slices across the layers of the file have samples all over
+// it.
+constexpr std::size_t kWindowBytes = std::size_t{64} << 20;
+
 // Reads slices of the label volume as the images have them.
 class SliceReader {
  public:
   SliceReader(const LabelGrid& grid, const store::BlobStore& blobs)
       : grid_(grid),
         samples_(blobs.open(grid.samples)),
-        raw_(std::size_t{grid.dims[0]} * grid.dims[1] * bytes_per_sample(grid.type)),
-        labels_(std::size_t{grid.dims[0]} * grid.dims[1]) {}
+        sample_bytes_(bytes_per_sample(grid.type)),
+        slice_bytes_(sample_bytes_ * grid.dims[0] * grid.dims[1]),
+        labels_(std::size_t{grid.dims[0]} * grid.dims[1]) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      stored_dims_[grid.axes[axis]] = grid.dims[axis];
+      image_axes_[grid.axes[axis]] = axis;
+    }
+  }
 
   std::span<const std::int64_t> read(std::uint32_t slice) {
     if (current_ == slice) return labels_;
-    const std::uint64_t there = grid_.is_flipped[2] ? grid_.dims[2] - 1 - slice : slice;
-    if (samples_->read_at(volume::kHeaderBytes + there * raw_.size(), raw_) != raw_.size()) {
-      throw Error(ErrorCode::kInternal, "a stored label volume became shorter");
-    }
-    with_sample(grid_.type, [&](auto sample) { decode<decltype(sample)>(); });
+    if (slice < begin_ || slice >= end_) read_window(slice);
+    with_sample(grid_.type, [&](auto sample) {
+      decode<decltype(sample)>(window_.data() + (slice - begin_) * slice_bytes_);
+    });
     current_ = slice;
     return labels_;
   }
 
  private:
+  // Along an axis of the file.
+  struct Range {
+    std::uint32_t begin;
+    std::uint32_t end;
+  };
+
+  void read_window(std::uint32_t slice) {
+    const bool are_layers = grid_.axes[2] == 2;
+    const std::size_t count =
+        are_layers ? 1 : std::clamp<std::size_t>(kWindowBytes / slice_bytes_, 1, grid_.dims[2]);
+    begin_ = slice;
+    end_ = static_cast<std::uint32_t>(std::min<std::size_t>(slice + count, grid_.dims[2]));
+    window_.resize((end_ - begin_) * slice_bytes_);
+    std::array<Range, 3> ranges = {Range{0, stored_dims_[0]}, Range{0, stored_dims_[1]},
+                                   Range{0, stored_dims_[2]}};
+    ranges.at(grid_.axes[2]) = grid_.is_flipped[2]
+                                   ? Range{grid_.dims[2] - end_, grid_.dims[2] - begin_}
+                                   : Range{begin_, end_};
+    for (std::uint32_t z = ranges[2].begin; z < ranges[2].end; ++z) read_rows(ranges, z);
+  }
+
+  void read_rows(const std::array<Range, 3>& ranges, std::uint32_t z) {
+    const std::size_t row_bytes = sample_bytes_ * stored_dims_[0];
+    rows_.resize(row_bytes * (ranges[1].end - ranges[1].begin));
+    const std::uint64_t first = std::uint64_t{z} * stored_dims_[1] + ranges[1].begin;
+    if (samples_->read_at(volume::kHeaderBytes + first * row_bytes, rows_) != rows_.size()) {
+      throw Error(ErrorCode::kInternal, "a stored label volume became shorter");
+    }
+    with_sample(grid_.type, [&](auto sample) { put_rows<decltype(sample)>(ranges, z); });
+  }
+
   template <class Sample>
-  void decode() {
-    const std::size_t columns = grid_.dims[0];
-    const std::size_t rows = grid_.dims[1];
-    for (std::size_t row = 0; row < rows; ++row) {
-      const std::size_t from = (grid_.is_flipped[1] ? rows - 1 - row : row) * columns;
-      for (std::size_t column = 0; column < columns; ++column) {
-        const std::size_t at = from + (grid_.is_flipped[0] ? columns - 1 - column : column);
-        Sample value;
-        std::memcpy(&value, raw_.data() + at * sizeof(Sample), sizeof(Sample));
-        labels_[row * columns + column] = label_of(value);
+  void put_rows(const std::array<Range, 3>& ranges, std::uint32_t z) {
+    const std::byte* row = rows_.data();
+    for (std::uint32_t y = ranges[1].begin; y < ranges[1].end; ++y) {
+      const std::size_t rest = place_along(1, y) + place_along(2, z);
+      for (std::uint32_t x = ranges[0].begin; x < ranges[0].end; ++x) {
+        std::memcpy(window_.data() + sizeof(Sample) * (place_along(0, x) + rest),
+                    row + sizeof(Sample) * x, sizeof(Sample));
       }
+      row += sizeof(Sample) * stored_dims_[0];
+    }
+  }
+
+  // What an index along an axis of the file adds to a sample's place in the window.
+  std::size_t place_along(std::size_t stored_axis, std::uint32_t index) const {
+    const std::size_t axis = image_axes_.at(stored_axis);
+    const std::size_t there = grid_.is_flipped.at(axis) ? grid_.dims.at(axis) - 1 - index : index;
+    if (axis == 0) return there;
+    return (axis == 1 ? there : (there - begin_) * grid_.dims[1]) * grid_.dims[0];
+  }
+
+  template <class Sample>
+  void decode(const std::byte* samples) {
+    for (std::size_t n = 0; n < labels_.size(); ++n) {
+      Sample value;
+      std::memcpy(&value, samples + n * sizeof(Sample), sizeof(Sample));
+      labels_[n] = label_of(value);
     }
   }
 
@@ -84,10 +140,39 @@ class SliceReader {
 
   const LabelGrid& grid_;
   const std::unique_ptr<const store::BlobReader> samples_;
-  std::vector<std::byte> raw_;
+  const std::size_t sample_bytes_;
+  const std::size_t slice_bytes_;
+  std::array<std::uint32_t, 3> stored_dims_ = {};  // along the axes of the file
+  std::array<std::size_t, 3> image_axes_ = {};     // for each of those, the images' axis
+  std::vector<std::byte> rows_;
+  std::vector<std::byte> window_;  // the slices [begin_, end_), as the images have them
+  std::uint32_t begin_ = 0;
+  std::uint32_t end_ = 0;
   std::vector<std::int64_t> labels_;
   std::optional<std::uint32_t> current_;
 };
+
+// The axis of the label volume that lies most along each axis of the images.
+std::array<std::size_t, 3> axes_along(const Geometry& images, const Geometry& labels) {
+  std::array<std::size_t, 3> axes = {0, 1, 2};
+  std::array<std::size_t, 3> best = axes;
+  double best_fit = -1;
+  do {
+    double fit = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double cosine = 0;
+      for (std::size_t row = 0; row < 9; row += 3) {
+        cosine += images.direction[row + axis] * labels.direction[row + axes[axis]];
+      }
+      fit += std::abs(cosine);
+    }
+    if (fit > best_fit + 1e-9) {
+      best_fit = fit;
+      best = axes;
+    }
+  } while (std::ranges::next_permutation(axes).found);
+  return best;
+}
 
 void check(const std::stop_token& stop) {
   if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
@@ -95,19 +180,42 @@ void check(const std::stop_token& stop) {
 
 }  // namespace
 
+ImageLattice images_of(const Volume& series) {
+  // Volumes of older versions have the order of their files.
+  if (!series.stored_axes) return {series.dims, series.geometry};
+  volume::AxisOrder order = {};
+  std::ranges::transform(*series.stored_axes, order.begin(), [](char letter) {
+    constexpr std::string_view kAlong = "LPS";
+    constexpr std::string_view kAgainst = "RAI";
+    const std::size_t along = kAlong.find(letter);
+    return along < kAlong.size() ? static_cast<int>(along) + 1
+                                 : -static_cast<int>(kAgainst.find(letter)) - 1;
+  });
+  return {volume::in_order(series.dims, order),
+          volume::in_order(series.dims, series.geometry, order)};
+}
+
+std::array<std::uint32_t, 3> dims_along(const Geometry& images, const Volume& labels) {
+  const auto axes = axes_along(images, labels.geometry);
+  return {labels.dims.at(axes[0]), labels.dims.at(axes[1]), labels.dims.at(axes[2])};
+}
+
 LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>& dims,
                      const Volume& labels) {
-  if (labels.dims != dims) throw_unfit("it has other sizes");
+  LabelGrid grid = {.dims = dims,
+                    .type = labels.type,
+                    .samples = labels.samples,
+                    .axes = axes_along(images, labels.geometry),
+                    .origin = images.origin};
+  if (dims_along(images, labels) != dims) throw_unfit("it has other sizes");
   for (const LabelEntry& entry : labels.labels) {
     if (!entry.values.empty()) throw_unfit("its labels share samples");
   }
-  LabelGrid grid = {
-      .dims = dims, .type = labels.type, .samples = labels.samples, .origin = images.origin};
   double smallest = images.spacing[0];
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = static_cast<std::size_t>(axis);
     const Place ours = volume::step_of(images, axis);
-    const Place theirs = volume::step_of(labels.geometry, axis);
+    const Place theirs = volume::step_of(labels.geometry, static_cast<int>(grid.axes[at]));
     grid.steps[at] = ours;
     grid.is_flipped[at] = ours[0] * theirs[0] + ours[1] * theirs[1] + ours[2] * theirs[2] < 0;
     smallest = std::min(smallest, images.spacing[at]);
@@ -120,7 +228,7 @@ LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>&
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double last = dims[axis] - 1.0;
       here[axis] = (corner >> axis & 1U) != 0 ? last : 0;
-      there[axis] = grid.is_flipped[axis] ? last - here[axis] : here[axis];
+      there.at(grid.axes[axis]) = grid.is_flipped[axis] ? last - here[axis] : here[axis];
     }
     if (!(distance(place_of(images, here), place_of(labels.geometry, there)) <=
           kTolerance * smallest)) {

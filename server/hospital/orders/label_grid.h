@@ -1,8 +1,9 @@
-// A label volume on the grid of a series: the same samples, perhaps in another order along an axis.
-// An AI that is given a series returns such a volume, often as NIfTI, whose rows go the other way.
+// A label volume on the grid of a series: the same samples, perhaps in another order. Volumes are
+// stored along the patient's axes, while images have rows and columns of their own.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -17,15 +18,29 @@
 namespace isomesh::orders {
 
 struct LabelGrid {
-  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};  // columns, rows, slices
   SampleType type = SampleType::kUint8;
-  std::string samples;                       // the key of the blob of the label volume
-  std::array<bool, 3> is_flipped = {};       // along each axis of the images
-  std::array<double, 3> origin = {0, 0, 0};  // of the images
+  std::string samples;                          // the key of the blob of the label volume
+  std::array<std::size_t, 3> axes = {0, 1, 2};  // the label volume's axis along each of the images'
+  std::array<bool, 3> is_flipped = {};          // along each axis of the images
+  std::array<double, 3> origin = {0, 0, 0};     // of the images
   std::array<std::array<double, 3>, 3> steps = {};
 };
 
-// `images` is the geometry of the series. Throws Error kUnusableVolume, with the reason, for label
+// The lattice of a series along its columns, rows and slices.
+struct ImageLattice {
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  Geometry geometry;
+};
+
+// The order of the samples in the file (Volume::stored_axes) is that of the images.
+ImageLattice images_of(const Volume& series);
+
+// The sizes of the label volume along the columns, rows and slices of the images.
+std::array<std::uint32_t, 3> dims_along(const Geometry& images, const Volume& labels);
+
+// `images` is the geometry of the series, along its columns, rows and slices, and `dims` their
+// numbers. Throws Error kUnusableVolume, with the reason, for label
 // volumes that have other sizes, are elsewhere, or have labels that share values.
 LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>& dims,
                      const Volume& labels);

@@ -235,8 +235,9 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
     record.order.volume = volume.id;
     record.work.identity = volume.dicom;
     if (record.order.label_volume) {
-      record.work.image_geometry = volume.geometry;
-      label_grid_of(record, volume.dims);  // fails at once if they do not fit
+      const ImageLattice images = images_of(volume);
+      record.work.image_geometry = images.geometry;
+      label_grid_of(record, images.dims);  // fails at once if they do not fit
     }
     record.work.segmented_series = segmented_series_of(record, stop);
   } catch (const Error& error) {
@@ -257,12 +258,13 @@ LabelGrid OrderSteps::label_grid_of(
   try {
     const Volume labels = services_.volumes.get(record.owner, *record.order.label_volume);
     const std::size_t images = record.work.identity->instances.size();
-    if (images != labels.dims[2]) {
+    const auto dims = dims_along(*record.work.image_geometry, labels);
+    if (images != dims[2]) {
       throw Error(ErrorCode::kUnusableVolume, "the series has " + std::to_string(images) +
                                                   " images, but the label volume has " +
-                                                  std::to_string(labels.dims[2]) + " slices");
+                                                  std::to_string(dims[2]) + " slices");
     }
-    return label_grid(*record.work.image_geometry, image_dims.value_or(labels.dims), labels);
+    return label_grid(*record.work.image_geometry, image_dims.value_or(dims), labels);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
     throw Error(ErrorCode::kUnusableVolume,

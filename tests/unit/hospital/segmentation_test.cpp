@@ -1,7 +1,9 @@
 // Label volumes on the grid of a series, and the segmentations made from them.
 #include "server/hospital/objects/segmentation.h"
 
+#include <array>
 #include <cstring>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "server/hospital/orders/label_grid.h"
 #include "server/volume/canonical.h"
 #include "tests/support/errors.h"
+#include "tests/support/storages.h"
 #include "tests/unit/hospital/fixture.h"
 
 namespace isomesh::orders {
@@ -69,17 +72,47 @@ TEST(LabelGridTest, OfAnotherPlaceDoesNotFit) {
   EXPECT_THAT(reason_of(labels), HasSubstr("not at the places"));
   labels = label_volume();
   labels.geometry.direction = {0, 1, 0, 1, 0, 0, 0, 0, 1};
+  EXPECT_THAT(reason_of(labels), HasSubstr("other sizes"));
+  labels.dims = {2, 3, 2};
   EXPECT_THAT(reason_of(labels), HasSubstr("not at the places"));
   labels = label_volume();
   labels.labels = {{.label = 1, .values = {1, 3}}};
   EXPECT_THAT(reason_of(labels), HasSubstr("share"));
 }
 
+// A series of sagittal images has other axes than its volume.
+TEST(ImagesOf, AVolumeHaveTheOrderOfTheFile) {
+  const test::SampleVolume<std::uint8_t> volume = {
+      .samples = std::vector<std::uint8_t>(2 * 3 * 4), .dims = {2, 3, 4}, .geometry = kImages};
+  for (const test::Storage& storage : test::all_storages()) {
+    Volume series;
+    series.dims = {2, 3, 4};
+    series.geometry = kImages;
+    std::string codes;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      codes += (storage.is_reversed[axis] ? "RAI" : "LPS")[storage.axes[axis]];
+    }
+    series.stored_axes = codes;
+    const ImageLattice images = images_of(series);
+    const auto stored = stored_as(volume, storage);
+    EXPECT_THAT(images.dims, ElementsAre(stored.dims.x, stored.dims.y, stored.dims.z));
+    EXPECT_EQ(images.geometry, stored.geometry) << codes;
+  }
+  Volume old;
+  old.dims = kSizes;
+  old.geometry = flipped();
+  EXPECT_EQ(images_of(old).geometry, flipped());
+}
+
 class SegmentationTest : public OrdersTest {
  protected:
   template <class Sample>
-  LabelGrid grid_of(const std::vector<Sample>& samples, const Geometry& geometry) {
+  LabelGrid grid_of(const std::vector<Sample>& samples, const Geometry& geometry,
+                    const Geometry& images = kImages,
+                    const std::array<std::uint32_t, 3>& sizes = kSizes,
+                    const std::array<std::uint32_t, 3>& stored_sizes = kSizes) {
     Volume labels = label_volume();
+    labels.dims = stored_sizes;
     labels.type = sample_type<Sample>();
     labels.geometry = geometry;
     std::string file(volume::kHeaderBytes, ' ');
@@ -87,7 +120,7 @@ class SegmentationTest : public OrdersTest {
     std::memcpy(file.data() + volume::kHeaderBytes, samples.data(),
                 samples.size() * sizeof(Sample));
     labels.samples = test::put(blobs_, file).key;
-    return label_grid(kImages, kSizes, labels);
+    return label_grid(images, sizes, labels);
   }
 
   // The frames, and then the bits.
@@ -133,6 +166,24 @@ TEST_F(SegmentationTest, HasTheOrderOfTheImages) {
   EXPECT_EQ(bits_of(grid_of(samples, flipped()), {1, 2}),
             "1@0 1@1 2@0 2@1 .1........111.....1....."
             "........");
+}
+
+// Volumes are stored along the patient's axes, whatever the rows and columns of their images are.
+TEST_F(SegmentationTest, HasTheOrderOfTheImagesHoweverTheLabelsAreStored) {
+  test::SampleVolume<std::uint8_t> labels = {
+      .samples = {}, .dims = {3, 4, 5}, .geometry = test::oblique_geometry()};
+  for (int n = 0; n < 3 * 4 * 5; ++n) labels.samples.push_back(n * n % 7 / 2);
+  const std::array<std::uint32_t, 3> sizes = {3, 4, 5};
+  std::string expected;
+  for (const test::Storage& storage : test::all_storages()) {
+    const auto stored = stored_as(labels, storage);
+    const LabelGrid grid = grid_of(stored.samples, stored.geometry, labels.geometry, sizes,
+                                   {stored.dims.x, stored.dims.y, stored.dims.z});
+    const std::string bits = bits_of(grid, {1, 2, 3});
+    if (expected.empty()) expected = bits;
+    EXPECT_EQ(bits, expected);
+  }
+  EXPECT_THAT(expected, HasSubstr("3@4 "));
 }
 
 // They are counted before they are all in memory: noise has most labels in each slice.
@@ -207,6 +258,81 @@ class LabelVolumeOrders : public OrdersTest {
     return error.fields().empty() ? "" : error.fields().front().field;
   }
 };
+
+// Rows lead to the back, columns to the feet; three rows of five. The slices are 1 mm apart.
+std::string sagittal_file(int slice) {
+  return test::dicom(
+      element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.4") +
+      element(8, 0x18, "UI", instance_of(slice)) + element(8, 0x60, "CS", "MR") +
+      element(0x10, 0x20, "LO", "PAT-1") + element(0x20, 0xD, "UI", kStudy) +
+      element(0x20, 0xE, "UI", kSeries) + element(0x20, 0x13, "IS", std::to_string(slice + 1)) +
+      element(0x20, 0x32, "DS", std::to_string(slice) + "\\0\\10") +
+      element(0x20, 0x37, "DS", "0\\1\\0\\0\\0\\-1") + element(0x20, 0x52, "UI", "1.9") +
+      test::number(0x28, 2, 1) + element(0x28, 4, "CS", "MONOCHROME2") +
+      test::number(0x28, 0x10, 3) + test::number(0x28, 0x11, 5) +
+      element(0x28, 0x30, "DS", "1\\1") + test::number(0x28, 0x100, 16) +
+      test::number(0x28, 0x101, 16) + test::number(0x28, 0x102, 15) + test::number(0x28, 0x103, 0) +
+      element(0x7FE0, 0x10, "OW", std::string(std::size_t{3} * 5 * 2, '\1')));
+}
+
+// Where samples of the label are, in LPS.
+std::set<std::array<double, 3>> places_of(std::uint8_t label, const Volume& volume,
+                                          const std::string& canonical) {
+  std::set<std::array<double, 3>> places;
+  const auto& [nx, ny, nz] = volume.dims;
+  for (std::size_t n = 0; n < std::size_t{nx} * ny * nz; ++n) {
+    if (static_cast<std::uint8_t>(canonical[volume::kHeaderBytes + n]) != label) continue;
+    const std::array<std::size_t, 3> index = {n % nx, n / nx % ny, n / nx / ny};
+    std::array<double, 3> place = volume.geometry.origin;
+    for (std::size_t at = 0; at < 9; ++at) {
+      place[at / 3] += volume.geometry.direction[at] * volume.geometry.spacing[at % 3] *
+                       static_cast<double>(index[at % 3]);
+    }
+    places.insert(place);
+  }
+  return places;
+}
+
+// The images to which the frames of a segmentation refer, in their order.
+std::vector<std::string> sources_of(const std::string& object) {
+  const std::string sequence("\x08\x00\x12\x21SQ", 6);  // SourceImageSequence
+  std::vector<std::string> sources;
+  for (std::size_t at = object.find(sequence); at != std::string::npos;
+       at = object.find(sequence, at + 1)) {
+    sources.push_back(object.substr(object.find(kSeries, at), instance_of(0).size()));
+  }
+  return sources;
+}
+
+// The slices of these images follow one another to the right, those of the stored volume to the
+// left.
+TEST_F(LabelVolumeOrders, OfSagittalImagesLieOnThem) {
+  std::vector<std::string> files;
+  for (int slice = 0; slice < kSlices; ++slice) files.push_back(sagittal_file(slice));
+  main_->hold(files);
+  std::string samples(std::size_t{4} * 5 * 3, '\0');  // x, y and z
+  for (const std::size_t place : {21, 22, 26, 41, 42, 46}) samples[place] = '\7';
+  const Volume labels = add_raw(
+      samples, {.dims = {4, 5, 3}, .type = SampleType::kUint8, .geometry = {.origin = {0, 0, 8}}});
+  OrderRequest with_labels = request();
+  with_labels.label_volume = labels.id;
+  const std::string id = submit(with_labels);
+  std::optional<store::Lease> lease;
+  ASSERT_TRUE(until([&] { return (lease = jobs_.claim("test", minutes(1))).has_value(); }))
+      << (get(id).error ? get(id).error->detail : "");
+  store::Outcome outcome;
+  outcome.mesh.emplace().triangles = 12;
+  outcome.mesh->labels = {{.label = 7, .voxels = 6}};
+  ASSERT_TRUE(jobs_.finish(*lease, outcome));
+  orders_->job_ended(lease->id);
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+
+  const std::string object = main_->last_object();
+  EXPECT_THAT(sources_of(object), ElementsAre(instance_of(2), instance_of(1)));
+  test::write_file(folder_ / "seg", object);
+  const Volume again = library_.add("", folder_ / "seg", {}).first;
+  EXPECT_EQ(places_of(1, again, blob(again.samples)), places_of(7, labels, blob(labels.samples)));
+}
 
 TEST_F(LabelVolumeOrders, NeedLabelsOfTheOwner) {
   EXPECT_EQ(refused(request()), "label_volume");
