@@ -83,6 +83,10 @@ std::array<T, count> array_of(const T (&values)[count]) {
   return std::to_array(values);
 }
 
+Geometry geometry_of(const isomesh_volume& volume) {
+  return {array_of(volume.origin), array_of(volume.spacing), array_of(volume.direction)};
+}
+
 // Every label's own surface, one after the other, as a PLY file has them.
 struct LabelArrays {
   mesh::Buffer<mesh::Vec3> vertices;
@@ -250,8 +254,7 @@ class Run {
     Volume volume;
     volume.type = *type;
     volume.dims = array_of(given_.dims);
-    volume.geometry = {array_of(given_.origin), array_of(given_.spacing),
-                       array_of(given_.direction)};
+    volume.geometry = geometry_of(given_);
     if (const auto fault = volume::find_fault(volume.dims, volume.geometry)) {
       throw invalid_parameter(fault->field, fault->message);
     }
@@ -295,6 +298,26 @@ class Run {
 
 // NOLINTBEGIN(readability-identifier-naming, misc-use-internal-linkage)
 #define ISOMESH_EXPORT extern "C"  // exports.map keeps all else inside
+
+// Puts sizes and geometry into the order in which volumes are stored (server/volume/geometry.h).
+// Axis n is then the axis |axes[n]| of before, from 1, and reversed if that is negative: the
+// samples are to be put into that order, too. A geometry with a fault, which isomesh_start tells,
+// stays as it is.
+ISOMESH_EXPORT void isomesh_order(isomesh_volume* volume, std::int32_t (*axes)[3]) {
+  const auto dims = array_of(volume->dims);
+  Geometry geometry = geometry_of(*volume);
+  volume::AxisOrder order = volume::kFilesOrder;
+  if (!volume::find_fault(dims, geometry)) {
+    geometry = volume::normalised(geometry);
+    order = volume::canonical_order(geometry);
+    geometry = volume::canonical_geometry(dims, geometry);
+    std::ranges::copy(volume::in_order(dims, order), volume->dims);
+    std::ranges::copy(geometry.origin, volume->origin);
+    std::ranges::copy(geometry.spacing, volume->spacing);
+    std::ranges::copy(geometry.direction, volume->direction);
+  }
+  std::ranges::copy(order, *axes);
+}
 
 // Returns null if there is no memory or thread for it.
 ISOMESH_EXPORT Run* isomesh_start(const isomesh_volume* volume, const char* parameters) {

@@ -1,5 +1,6 @@
 """Meshes that are made in this process, and the package that does it, which the build has put together."""
 
+import itertools
 import multiprocessing
 import os
 import re
@@ -64,6 +65,7 @@ class SameAsTheServer(DaemonTest):
             {"iso": -9},
             {"iso": -9, "spacing": (0.5, 0.75, 1.5), "scheme": "bcc", "passes": 0},
             {"iso": -9.25, "affine": turned(), "smoothing": "taubin", "passes": 20, "close": True},
+            {"iso": -9, "affine": [[0, 0, 2, 5], [-1, 0, 0, 30], [0, 1.5, 0, -7], [0, 0, 0, 1]], "scheme": 5},
             {"iso": -14, "close": True, "scheme": "5", "regularize": False, "interpolation": "midpoint"},
             {"iso": -9, "max_error_mm": 0.1},
             {"iso": -9, "triangles": 500, "untangle": True},
@@ -145,6 +147,25 @@ class InThisProcess(LimitedTest):
                 self.assertEqual([each["code"] for each in made.notes], codes)
         axes = [isomesh_kernels.mesh(array, iso=-9, **keywords) for array, keywords in (copied[0], in_place[0], in_place[1])]
         self.assertEqual(len({(each.vertices.tobytes(), each.faces.tobytes()) for each in axes}), 1)
+
+    def test_the_order_of_axes_does_not_matter(self):
+        """All 48 orders of the axes of one volume."""
+        scan = numpy.random.default_rng(1).random((9, 8, 7), "float32")
+        labels = atlas()[::2, ::2, ::2]
+        affine = numpy.array([[-0.75, 0, 0, 30], [0, -1, 0, -8], [0, 0, 1.5, 4], [0, 0, 0, 1]])
+        for array, keywords in ((scan, {"iso": 0.6}), (scan, {"iso": 0.6, "scheme": 5, "close": True}), (labels, {"labels": "all"})):
+            meshes = set()
+            for axes in itertools.permutations(range(3)):
+                for signs in itertools.product((1, -1), repeat=3):
+                    place = numpy.zeros((4, 4))
+                    place[3, 3] = 1
+                    for column, (axis, sign) in enumerate(zip(axes, signs)):
+                        place[axis, column] = sign
+                        place[axis, 3] = 0 if sign > 0 else array.shape[axis] - 1
+                    stored = array.transpose(axes)[tuple(slice(None, None, sign) for sign in signs)]
+                    made = isomesh_kernels.mesh(stored, affine=affine @ place, **keywords)
+                    meshes.add((made.vertices.tobytes(), made.faces.tobytes()))
+            self.assertEqual(len(meshes), 1, keywords)
 
     def test_arrays_are_the_memory_of_the_kernels(self):
         made = isomesh_kernels.mesh(ball(), iso=-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import json
 import os
 import weakref
@@ -55,7 +56,9 @@ def _loaded() -> Any:
             "or the folder python of a build with -D ISOMESH_KERNELS=ON"
         ) from error
     run = ctypes.c_void_p
-    library.isomesh_start.argtypes, library.isomesh_start.restype = [ctypes.POINTER(_Volume), ctypes.c_char_p], run
+    volume = ctypes.POINTER(_Volume)
+    library.isomesh_order.argtypes, library.isomesh_order.restype = [volume, ctypes.POINTER(ctypes.c_int32 * 3)], None
+    library.isomesh_start.argtypes, library.isomesh_start.restype = [volume, ctypes.c_char_p], run
     library.isomesh_wait.argtypes = [run, ctypes.c_int32, ctypes.POINTER(ctypes.c_double)]
     library.isomesh_wait.restype = ctypes.c_bool
     library.isomesh_result.argtypes, library.isomesh_result.restype = [run], _Made
@@ -66,6 +69,33 @@ def _loaded() -> Any:
 
 _library = _loaded()
 _used_by: List[int] = []  # the process whose threads make the meshes, once there are any
+
+
+def _volume_of(raw: Raw) -> Any:
+    return _Volume(
+        None,
+        raw.type.encode(),
+        (ctypes.c_uint32 * 3)(*raw.dims),
+        (ctypes.c_double * 3)(*raw.origin),
+        (ctypes.c_double * 3)(*raw.spacing),
+        (ctypes.c_double * 9)(*raw.direction),
+    )
+
+
+def in_order(samples: Any, raw: Raw) -> Tuple[Any, Raw]:
+    """A view of the samples in the order in which a server stores volumes: indices grow towards the patient's left, back and
+    head, as nearly as the directions allow. So the mesh does not depend on the order of the array's axes."""
+    volume, axes = _volume_of(raw), (ctypes.c_int32 * 3)()
+    _library.isomesh_order(ctypes.byref(volume), ctypes.byref(axes))
+    view = samples.transpose([abs(axis) - 1 for axis in axes])[tuple(slice(None, None, -1 if axis < 0 else 1) for axis in axes)]
+    ordered = dataclasses.replace(
+        raw,
+        dims=tuple(volume.dims),
+        origin=tuple(volume.origin),
+        spacing=tuple(volume.spacing),
+        direction=tuple(volume.direction),
+    )
+    return view, ordered
 
 
 class Run:
@@ -80,17 +110,9 @@ class Run:
                 'start processes with multiprocessing.get_context("spawn")'
             )
         _used_by[:] = [os.getpid()]
-        volume = _Volume(
-            samples.ctypes.data,
-            raw.type.encode(),
-            (ctypes.c_uint32 * 3)(*raw.dims),
-            (ctypes.c_double * 3)(*raw.origin),
-            (ctypes.c_double * 3)(*raw.spacing),
-            (ctypes.c_double * 9)(*raw.direction),
-            left_out,
-            memory_bytes,
-            is_ct,
-        )
+        volume = _volume_of(raw)
+        volume.samples = samples.ctypes.data
+        volume.left_out, volume.memory_bytes, volume.is_ct = left_out, memory_bytes, is_ct
         self._run = _library.isomesh_start(ctypes.byref(volume), json.dumps(parameters).encode())
         if not self._run:
             raise MemoryError("there is no memory or no thread for a mesh")

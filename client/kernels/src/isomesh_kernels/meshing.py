@@ -12,7 +12,7 @@ from isomesh_client.mesh import why_empty
 from isomesh_client.parameters import OMITTED, as_plain, by_keywords, given
 from isomesh_client.uploads import described
 
-from .library import Run, physical_bytes
+from .library import Run, in_order, physical_bytes
 
 if TYPE_CHECKING:
     from isomesh_client import api
@@ -65,9 +65,12 @@ def mesh(
     counter-clockwise seen from outside; with `labels`, also `labels` of the faces (m,) and `colors`, uint8 (n, 3). The
     numbers are those of the service for the same parameters. `mesh.job["mesh"]` has what was measured.
 
-    Samples are read where they are if x varies fastest, they have no gaps, and their type is one of uint8, int8, uint16,
-    int16, uint32, int32, float32, float64 in the machine's byte order: a Fortran-ordered array, or a C-ordered one with
-    axes="zyx". Any other array is copied once; a note in `mesh.notes` says so.
+    Samples are meshed in the order in which a server stores them: indices grow towards the patient's left, back and
+    head, as nearly as the directions allow. So the mesh does not depend on the order of the array's axes. They are read
+    where they are if they have that order, its first index varies fastest, they have no gaps, and their type is one of
+    uint8, int8, uint16, int16, uint32, int32, float32, float64 in the machine's byte order: without `affine`, a
+    Fortran-ordered array, or a C-ordered one with axes="zyx". Any other array is copied once; a note in `mesh.notes`
+    says so.
 
     Other threads of Python run meanwhile. An interrupt (Ctrl-C), and an exception of `progress`, ends the work at once.
 
@@ -103,13 +106,13 @@ def _prepared(
         raise TypeError(f"cannot mesh a {type(array).__name__}: give a numpy array")
     given_array = numpy.asanyarray(array)
     samples, target, raw = described(given_array.T if axes == "zyx" else given_array, affine, space, spacing)
-    samples = numpy.asarray(samples)
+    samples, raw = in_order(numpy.asarray(samples), raw)
     if samples.dtype == bool:
         samples = samples.view("uint8")
     notes: List[Any] = []
     if samples.dtype != target or not samples.flags.f_contiguous or not samples.flags.aligned:
         wanted = "" if samples.dtype == target else f" as {target}"
-        notes.append({"code": "copied", "detail": f"The samples were copied{wanted}, with x fastest."})
+        notes.append({"code": "copied", "detail": f"The samples were copied{wanted}, with their first index fastest."})
         samples = numpy.array(samples, target, order="F")
     left_out = 0
     if target.kind == "f":
