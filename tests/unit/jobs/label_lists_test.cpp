@@ -16,7 +16,8 @@ using testing::ElementsAre;
 
 class LabelListsTest : public test::JobsFixture {
  protected:
-  // Turned, mirrored and stretched, so that no axis is like another.
+  // Turned, mirrored and stretched, so that no axis is like another. The volume has the samples
+  // along the patient's axes: x is the j of the upload, y is its i backwards.
   static Geometry crooked() {
     return {
         .origin = {10, -20, 30}, .spacing = {0.5, 2, 3}, .direction = {0, 1, 0, -1, 0, 0, 0, 0, 1}};
@@ -33,8 +34,8 @@ class LabelListsTest : public test::JobsFixture {
   // 4 x 3 x 2 samples: a 7 and two 9s.
   Volume add_three_voxels() {
     std::vector<std::int16_t> samples(24);
-    samples[1] = 7;                 // (1, 0, 0)
-    samples[14] = samples[19] = 9;  // (2, 0, 1) and (3, 1, 1)
+    samples[1] = 7;                 // (1, 0, 0), in the volume (0, 2, 0)
+    samples[14] = samples[19] = 9;  // (2, 0, 1) and (3, 1, 1), in the volume (0, 1, 1), (1, 0, 1)
     return add_samples(samples, {4, 3, 2}, SampleType::kInt16);
   }
 
@@ -49,14 +50,14 @@ TEST_F(LabelListsTest, TellsWhatTheSamplesHave) {
   const VolumeLabel seven = {.label = 7,
                              .voxels = 1,
                              .volume_mm3 = 3,
-                             .low = {1, 0, 0},
-                             .high = {1, 0, 0},
+                             .low = {0, 2, 0},
+                             .high = {0, 2, 0},
                              .bounds = {{{9, -20.75, 28.5}, {11, -20.25, 31.5}}}};
   const VolumeLabel nine = {.label = 9,
                             .voxels = 2,
                             .volume_mm3 = 6,
-                            .low = {2, 0, 1},
-                            .high = {3, 1, 1},
+                            .low = {0, 0, 1},
+                            .high = {1, 1, 1},
                             .bounds = {{{9, -21.75, 31.5}, {13, -20.75, 34.5}}}};
   EXPECT_THAT(list.labels, ElementsAre(seven, nine));
   EXPECT_EQ(lists_.page_of("", volume, 0, {}), list);
@@ -93,8 +94,8 @@ TEST_F(LabelListsTest, AVoxelMayBelongToSeveralLabels) {
   EXPECT_EQ(list.labels[1].label, 7);
   EXPECT_EQ(list.labels[1].voxels, 3U);
   EXPECT_EQ(list.labels[1].volume_mm3, 9);
-  EXPECT_EQ(list.labels[1].low, (std::array<std::uint32_t, 3>{1, 0, 0}));
-  EXPECT_EQ(list.labels[1].high, (std::array<std::uint32_t, 3>{3, 1, 1}));
+  EXPECT_EQ(list.labels[1].low, (std::array<std::uint32_t, 3>{0, 0, 0}));
+  EXPECT_EQ(list.labels[1].high, (std::array<std::uint32_t, 3>{1, 2, 1}));
 }
 
 // Planes and volumes that are cut into blocks of 4 MiB.
@@ -109,8 +110,8 @@ TEST_F(LabelListsTest, BlocksAreCountedAsOne) {
       samples[at] = static_cast<std::int32_t>(random() % 5) - 2;
       if (samples[at] == 0) continue;
       VolumeLabel& label = expected[samples[at]];
-      const Dims place = {static_cast<std::uint32_t>(at % dims[0]),
-                          static_cast<std::uint32_t>(at / dims[0] % dims[1]),
+      const Dims place = {static_cast<std::uint32_t>(at / dims[0] % dims[1]),
+                          static_cast<std::uint32_t>(dims[0] - 1 - at % dims[0]),
                           static_cast<std::uint32_t>(at / dims[0] / dims[1])};
       for (std::size_t axis = 0; axis < 3; ++axis) {
         label.low[axis] = label.voxels == 0 ? place[axis] : std::min(label.low[axis], place[axis]);
