@@ -285,6 +285,7 @@ std::string volume_report(const Volume& volume) {
                {"spacing", listed(volume.geometry.spacing) + ' ' + unit},
                {"origin", listed(volume.geometry.origin) + ' ' + unit + " (LPS)"},
                {"direction", listed(volume.geometry.direction)},
+               {"axes in the file", volume.stored_axes.value_or("unknown")},
                {"range", human_number(volume.range[0]) + " to " + human_number(volume.range[1])},
                {"suggested iso", human_number(volume.suggested_iso)}};
   if (volume.modality) rows.push_back({"modality", *volume.modality});

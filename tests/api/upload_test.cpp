@@ -80,10 +80,14 @@ TEST_F(UploadTest, TakesTheWholeDescriptionOfRawSamples) {
       target_ + "&spacing=0.5,1,2&origin=-1,-2,3.5&direction=0,1,0,1,0,0,0,0,1&byte_order=big",
       sphere_.bytes);
   ASSERT_EQ(answer.status, 201) << answer.body;
-  const Geometry geometry = volume_from_json(answer.body).geometry;
-  EXPECT_EQ(geometry.spacing, (std::array<double, 3>{0.5, 1, 2}));
-  EXPECT_EQ(geometry.origin, (std::array<double, 3>{-1, -2, 3.5}));
-  EXPECT_EQ(geometry.direction, (std::array<double, 9>{0, 1, 0, 1, 0, 0, 0, 0, 1}));
+  // The volume has its axes in the patient's order.
+  const Volume volume = volume_from_json(answer.body);
+  EXPECT_EQ(volume.stored_axes, "PLS");
+  EXPECT_THAT(daemon_.command({"info", volume.id}).output,
+              testing::ContainsRegex("axes in the file +PLS\n"));
+  EXPECT_EQ(volume.geometry.spacing, (std::array<double, 3>{1, 0.5, 2}));
+  EXPECT_EQ(volume.geometry.origin, (std::array<double, 3>{-1, -2, 3.5}));
+  EXPECT_EQ(volume.geometry.direction, Geometry().direction);
 }
 
 // The names of transfer codings are case-insensitive (RFC 9112, 7).

@@ -196,7 +196,7 @@ describe('a volume that its file places wrongly', () => {
     await page.waitForURL(volumePage);
     const idOf = (): string => volumePage.exec(page.url())?.[0].split('/').pop() ?? '';
     const first = idOf();
-    const change = async (name: string): Promise<{ direction: number[] }> => {
+    const change = async (name: string): Promise<{ stored_axes: string }> => {
       const before = idOf();
       await page.getByText('Is the volume placed wrongly?').click();
       await page.getByRole('button', { name }).click();
@@ -204,13 +204,14 @@ describe('a volume that its file places wrongly', () => {
       return daemon.json(`/v1/volumes/${idOf()}`);
     };
     const flipped = await change('Flip left and right');
-    expect(flipped.direction).toEqual([-1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    expect(flipped.stored_axes).toBe('RPS');
+    await expect.poll(() => page.locator('p.facts').innerText()).toContain('stored as RPS');
     const note = page.locator('[data-note="orientation-changed"]');
     await expect.poll(() => note.innerText()).toContain('-x,y,z');
     await change('Flip left and right');
     expect(idOf()).toBe(first);
     await expect.poll(() => note.count()).toBe(0);
-    expect((await change('Turn in axial slices')).direction).toEqual([0, -1, 0, 1, 0, 0, 0, 0, 1]);
+    expect((await change('Turn in axial slices')).stored_axes).toBe('PRS');
     await expect.poll(() => note.innerText()).toContain('y,-x,z');
   });
 });

@@ -68,6 +68,7 @@ function factsOf(volume: Volume): string {
     volume.modality,
     `${formatDims(volume.dims)}, ${volume.type}`,
     formatSpacing(volume.spacing),
+    volume.stored_axes && `stored as ${volume.stored_axes}`,
     `values ${volume.range.map((value) => formatValue(value, spanOf(volume))).join(' to ')}`,
   ]
     .filter(Boolean)
