@@ -76,8 +76,9 @@ Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geom
 //     spacing, and to 1e-3 of it if that is within single precision: 2^-23 of the largest
 //     coordinate, but at most 1/8 of that step, and at least 2^-15 of the smallest spacing.
 // So a number as people choose it is the same after single precision, and any number after double
-// precision. Beside single precision, rounding moves no sample by more than about 3e-5 of the
-// smallest spacing. The result of the result is itself. The geometry must be normalised and free of
+// precision. Rounding moves a sample by at most about 3e-5 of the smallest spacing and 2^-23 of the
+// largest coordinate together, which is the precision of a mesh. The result of the result is
+// itself. The geometry must be normalised and free of
 // faults (find_fault).
 Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry);
 
