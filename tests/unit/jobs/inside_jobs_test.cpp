@@ -57,9 +57,9 @@ TEST_F(InsideJobs, CloseSmoothProveAndCertify) {
     parameters.scheme = scheme;
     const MeshSummary mesh = run(volume, parameters).mesh;
     EXPECT_TRUE(mesh.quality.encloses_volume);
-    EXPECT_NEAR(mesh.volume_mm3.smoothed, kBall - kCap, 0.04 * kBall);
+    EXPECT_NEAR(mesh.volume_mm3.smoothed, kBall - kCap, 0.06 * kBall);
     ASSERT_TRUE(mesh.certificate);
-    EXPECT_TRUE(mesh.certificate->bound_mm) << mesh.certificate->why_unproven;
+    EXPECT_TRUE(mesh.certificate->bound_mm) << mesh.certificate->why_unproven.value_or("");
     EXPECT_LE(mesh.certificate->found_mm, 0.4);
   }
 }
