@@ -97,13 +97,16 @@ void append(const mesh::Mesh& mesh, std::int64_t label, Surface& surface) {
   }
 }
 
-// Imports the file, and makes the mesh as the program of jobs does.
-Surface surface_of(const std::string& file, MeshParameters parameters) {
+// Imports the file, and makes the mesh as the program of jobs does, unless its samples are known.
+Surface surface_of(const std::string& file, MeshParameters parameters, const std::string& known) {
   const TemporaryFolder folder(isomesh::test::fast_place());
   isomesh::test::write_file(folder / "upload", file);
   const std::filesystem::path target = folder / "canonical";
   const Volume volume = import_volume(
       {.source = folder / "upload", .scratch = folder.path(), .target = target, .options = {}});
+  Surface surface;
+  surface.samples = sha256_of(isomesh::test::read_file(target));
+  if (surface.samples == known) return surface;
   const volume::CanonicalVolume canonical(target);
   if (parameters.labels) jobs::limit_displacement(volume, parameters);
   parameters.formats.clear();
@@ -117,8 +120,6 @@ Surface surface_of(const std::string& file, MeshParameters parameters) {
                            .measures = {},
                            .memory_bytes = std::uint64_t{1} << 30},
                           {}, progress, workspace);
-  Surface surface;
-  surface.samples = sha256_of(isomesh::test::read_file(target));
   if (!parameters.labels) append(workspace.mesh, 0, surface);
   if (parameters.labels) {
     const auto labels = label_surfaces(workspace.walls, {});
@@ -198,7 +199,7 @@ bool are_same(const Surface& one, const Surface& other, double tolerance) {
   return triangles_at(places, one) == triangles_at(places, other);
 }
 
-// How many of the storages give another surface, or other samples, than the first one.
+// The storages that give another surface, or other samples, than the first one.
 struct Differing {
   int surfaces = 0;
   int samples = 0;
@@ -209,17 +210,23 @@ struct Differing {
 template <class T>
 Differing differing(const SampleVolume<T>& volume, const MeshParameters& parameters,
                     const std::function<std::string(const SampleVolume<T>&)>& write = as_nrrd<T>) {
+  // Equal files of samples give equal meshes, so few of them are made again.
+  constexpr int kMadeAgain = 12;
   Differing count;
   std::optional<Surface> first;
+  int at = 0;
   const double tolerance = 1e-4 * std::ranges::min(volume.geometry.spacing);
   for (const Storage& storage : all_storages()) {
-    Surface surface = surface_of(write(stored_as(volume, storage)), parameters);
+    const bool is_made = ++at % kMadeAgain == 0 || !first;
+    Surface surface = surface_of(write(stored_as(volume, storage)), parameters,
+                                 is_made ? std::string() : first->samples);
     if (!first) {
       EXPECT_GT(surface.triangles.size(), 100U);
       first = std::move(surface);
       continue;
     }
     if (surface.samples != first->samples) ++count.samples;
+    if (!is_made && surface.samples == first->samples) continue;
     if (!are_same(*first, surface, tolerance)) ++count.surfaces;
   }
   return count;
