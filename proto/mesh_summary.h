@@ -152,8 +152,8 @@ struct WallSummary {
   std::int64_t a = 0;
   std::optional<std::int64_t> b = {};  // greater than `a`; empty: the background
   double area_mm2 = 0;
-  // How many faces voxels of the two share: 0 where they meet at edges and corners only. None of a
-  // job of an older server.
+  // The number of faces that voxels of the two share: 0 where they meet at edges and corners only.
+  // A job of an older server has none.
   std::optional<std::uint64_t> faces = {};
   std::optional<std::string> a_name = {};
   std::optional<std::string> b_name = {};

@@ -42,7 +42,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "non-finite-samples",
      .meaning = "Some samples are infinite or not a number. They got the smallest sample's value, "
                 "or 0 if all others are larger whole numbers, so they lie outside the surface at "
-                "any larger iso-value. The suggested iso-value leaves them out.",
+                "any larger iso-value, and inside it with `inside=below`. The suggested iso-value "
+                "leaves them out.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",
@@ -108,7 +109,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "padding",
      .meaning = "Some samples have the padding value of the file, which is not part of the image. "
                 "They got the smallest other sample's value, so they lie outside the surface at "
-                "any larger iso-value. The range and the suggested iso-value leave them out. With "
+                "any larger iso-value, and inside it with `inside=below`. The range and the "
+                "suggested iso-value leave them out. With "
                 "`accept=padding` they are samples like others.",
      .is_acceptable = true,
      .is_in_mesh = true},

@@ -272,8 +272,8 @@ class ScalarWalk {
     }
   }
 
-  // Of points that are equally near to the iso-value those of at least the iso-value are first, so
-  // both sides of a surface join the same crossings. Midpoints are equally near to all.
+  // Points of at least the iso-value come before others that are equally near to it, so both sides
+  // of a surface join the same crossings. Midpoints are equally near to all.
   bool is_inside_first() const {
     return options_.inside == Inside::kAbove || options_.interpolation == Interpolation::kMidpoint;
   }

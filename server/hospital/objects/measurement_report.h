@@ -21,6 +21,7 @@ struct MeasuredSurface {
   std::optional<std::int64_t> label = {};
   std::optional<DicomSegment> segment = {};  // the label's codes
   std::optional<double> volume_mm3 = {};     // empty: the surface encloses none
+  bool is_inside_out = false;                // so it encloses none, although it is closed
   double area_mm2 = 0;
   double diameter_mm = 0;  // the largest distance of two vertices
 };

@@ -112,7 +112,7 @@ class SliceReader {
     }
   }
 
-  // What an index along an axis of the file adds to a sample's place in the window.
+  // An index along an axis of the file adds this much to a sample's place in the window.
   std::size_t place_along(std::size_t stored_axis, std::uint32_t index) const {
     const std::size_t axis = image_axes_.at(stored_axis);
     const std::size_t there = grid_.is_flipped.at(axis) ? grid_.dims.at(axis) - 1 - index : index;

@@ -161,20 +161,6 @@ double deviation_mm(const MeshSummary& mesh) {
   return is_smoothed ? simplified + mesh.displacement_mm.max : simplified;
 }
 
-std::string description_of(const Job& job) {
-  const MeshParameters& parameters = job.parameters;
-  const std::string what = parameters.labels ? "label"
-                           : parameters.iso  ? "iso " + to_text(*parameters.iso)
-                                             : "iso otsu";
-  std::string text = what + ", scheme " + std::string(to_string(parameters.scheme)) + ", " +
-                     std::to_string(parameters.passes) + " passes";
-  // Distance of the object's vertices and triangles from the extracted surface.
-  if (job.mesh->certificate) {
-    text += ", within " + number_text(rounded_up(deviation_mm(*job.mesh))) + " mm";
-  }
-  return in_short(text);
-}
-
 std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Document& document) {
   if (!document.segment) return std::nullopt;
   if (auto known = find_segment(identity, *document.segment)) return known;
@@ -336,6 +322,21 @@ std::uint64_t bytes_of(const dicom::Envelope& envelope, const Document& document
 constexpr std::uint64_t kGrowthOfText = 400;
 
 }  // namespace
+
+std::string description_of(const Job& job) {
+  const MeshParameters& parameters = job.parameters;
+  const std::string side = parameters.inside == Inside::kBelow ? "below " : "iso ";
+  const std::string what = parameters.labels ? "label"
+                           : parameters.iso  ? side + to_text(*parameters.iso)
+                                             : side + "otsu";
+  std::string text = what + ", scheme " + std::string(to_string(parameters.scheme)) + ", " +
+                     std::to_string(parameters.passes) + " passes";
+  // Distance of the object's vertices and triangles from the extracted surface.
+  if (job.mesh->certificate) {
+    text += ", within " + number_text(rounded_up(deviation_mm(*job.mesh))) + " mm";
+  }
+  return in_short(text);
+}
 
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const Making& making, store::BlobStore& blobs,

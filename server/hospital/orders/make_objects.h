@@ -37,6 +37,10 @@ struct Making {
   std::optional<LabelGrid> labels = {};  // of an order with a label volume
 };
 
+// The content description of a job's objects: its iso-value with the side that is inside, and how
+// the surface was made. At most 64 characters, the limit of LO. The job has a mesh.
+std::string description_of(const Job& job);
+
 // Makes the objects of all formats that the order sends. STL: one, or one for each label. OBJ: one
 // of all labels, after the object of their materials. SR: one report on all surfaces. SEG: one
 // segmentation with the samples of all labels that have a surface. UIDs are

@@ -59,6 +59,12 @@ double diameter_of(const store::BlobReader& blob, std::uint64_t offset, std::uin
   return mesh::largest_distance(points, stop);
 }
 
+// Says why a surface has no volume, if it has none.
+std::string volume_text(const dicom::MeasuredSurface& surface) {
+  if (surface.volume_mm3) return number_text(*surface.volume_mm3);
+  return surface.is_inside_out ? "inside out" : "open";
+}
+
 }  // namespace
 
 std::optional<DicomSegment> find_segment(const DicomIdentity& identity, std::int64_t label) {
@@ -77,7 +83,10 @@ std::vector<dicom::MeasuredSurface> measure_surfaces(const Job& job, const Dicom
         .name = title,
         .area_mm2 = mesh.area_mm2,
         .diameter_mm = diameter_of(*blobs.open(stl.sha256), 0, stl.bytes, stop)};
-    if (mesh.quality.encloses_volume) whole.volume_mm3 = mesh.volume_mm3.smoothed;
+    if (mesh.quality.encloses_volume)
+      whole.volume_mm3 = mesh.volume_mm3.smoothed;
+    else
+      whole.is_inside_out = mesh.quality.closed && mesh.quality.oriented;
     return {whole};
   }
   const jobs::JobLabels labels(job, blobs);
@@ -99,7 +108,10 @@ std::vector<dicom::MeasuredSurface> measure_surfaces(const Job& job, const Dicom
         .segment = find_segment(identity, label.label),
         .area_mm2 = label.area_mm2,
         .diameter_mm = diameter_of(*zip, file.offset, file.bytes, stop)};
-    if (label.encloses_volume()) surface.volume_mm3 = label.volume_mm3;
+    if (label.encloses_volume())
+      surface.volume_mm3 = label.volume_mm3;
+    else
+      surface.is_inside_out = label.closed && label.oriented;
     surfaces.push_back(std::move(surface));
   });
   return surfaces;
@@ -109,8 +121,8 @@ std::string text_of(const std::vector<dicom::MeasuredSurface>& surfaces) {
   std::string text;
   for (const dicom::MeasuredSurface& each : surfaces) {
     text += (each.label ? std::to_string(*each.label) : "") + ' ' + each.name + ' ' +
-            (each.volume_mm3 ? number_text(*each.volume_mm3) : "open") + ' ' +
-            number_text(each.area_mm2) + ' ' + number_text(each.diameter_mm) + '\n';
+            volume_text(each) + ' ' + number_text(each.area_mm2) + ' ' +
+            number_text(each.diameter_mm) + '\n';
   }
   return text;
 }

@@ -84,7 +84,7 @@ ContourGrid grid_of(const StructureSet& set, const std::optional<ContourGrid>& i
   return grid_of_images(set, *images);
 }
 
-// How to draw what the grid leaves out. The set still has its points.
+// Says how to draw what the grid leaves out. The set still has its points.
 std::string spacing_to_add(const StructureSet& set, const ContourGrid& grid,
                            const ImportOptions& options) {
   if (options.spacing) return "A smaller spacing=X,Y,Z (mm) draws smaller structures.";

@@ -107,7 +107,8 @@ std::uint64_t leave_out_padding(const SampleSet& padding, const ImportOptions& o
   with_samples(samples, volume.type, [&](auto typed) { replace(padding, image.smallest, typed); });
   volume.notes.push_back(
       note_of(NoteCode::kPadding,
-              what + ". At iso-values above the smallest sample they lie outside the surface."));
+              what + ". At iso-values above the smallest sample they lie outside the surface, or "
+                     "inside it with inside=below."));
   return count;
 }
 

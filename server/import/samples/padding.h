@@ -11,7 +11,7 @@
 
 namespace isomesh::import {
 
-// Gives padding the value of the smallest other sample, so it is outside at every larger iso-value.
+// Gives padding the value of the smallest other sample, so it is below every larger iso-value.
 // `padding` is not empty, and of the samples of `volume`, whose type and dims are set. Adds a note.
 // Returns the number of samples that are no part of the image, for finish().
 //

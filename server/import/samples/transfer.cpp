@@ -447,9 +447,10 @@ Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
     replace_non_finite(samples, volume.type, statistics.range[0]);
     left_out += statistics.non_finite;
     statistics = volume::measure(samples, volume.type, left_out);
-    volume.notes.push_back(
-        note_of(NoteCode::kNonFiniteSamples,
-                count + ". At iso-values above the smallest sample they lie outside the surface."));
+    volume.notes.push_back(note_of(
+        NoteCode::kNonFiniteSamples,
+        count + ". At iso-values above the smallest sample they lie outside the surface, or "
+                "inside it with inside=below."));
   }
   volume.range = statistics.range;
   const std::string stored =

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "proto/samples.h"
 #include "server/jobs/making/mesh_stages.h"
@@ -18,7 +21,10 @@ namespace {
 
 using Open = mesh::CavityCount::Open;
 
-// What a surface leaves open, and what another scheme would.
+// The most samples of all boxes that are searched, in multiples of the volume's: boxes overlap.
+constexpr std::uint64_t kMostSearches = 4;
+
+// The cavities that a surface leaves open, and those that another scheme would.
 struct ThinWalls {
   Open open;
   std::optional<Scheme> better = {};  // the scheme that leaves the fewest open
@@ -72,33 +78,86 @@ std::vector<Scheme> others_of(std::vector<Scheme> schemes, Scheme scheme) {
   return schemes;
 }
 
-// The rows of a label in its box and a sample around it, where the volume has one.
-template <class T>
-mesh::SignRows rows_of(const mesh::Lattice<T>& lattice, const mesh::LabelVoxels& label,
-                       const std::vector<std::int64_t>& values) {
-  const std::array dims = {lattice.dims.x, lattice.dims.y, lattice.dims.z};
-  std::array<std::uint32_t, 3> low = label.low;
+// The box of a label and a sample around it, where the volume has one.
+struct Box {
+  std::array<std::uint32_t, 3> low = {};
   std::array<std::uint32_t, 3> size = {};
+
+  std::uint64_t samples() const { return std::uint64_t{size[0]} * size[1] * size[2]; }
+};
+
+Box box_of(const mesh::LabelVoxels& label, const mesh::Dims& volume) {
+  const std::array dims = {volume.x, volume.y, volume.z};
+  Box box = {.low = label.low};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    low[axis] -= std::min<std::uint32_t>(low[axis], 1);
-    size[axis] = std::min(label.high[axis] + 2, dims[axis]) - low[axis];
+    box.low[axis] -= std::min<std::uint32_t>(box.low[axis], 1);
+    box.size[axis] = std::min(label.high[axis] + 2, dims[axis]) - box.low[axis];
   }
+  return box;
+}
+
+// The indices of the labels that are searched: those with the smallest boxes.
+std::vector<std::size_t> searched_labels(std::span<const mesh::LabelVoxels> labels,
+                                         const mesh::Dims& volume) {
+  std::vector<std::pair<std::uint64_t, std::size_t>> boxes;
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    boxes.emplace_back(box_of(labels[n], volume).samples(), n);
+  }
+  std::ranges::sort(boxes);
+  std::vector<std::size_t> searched;
+  std::uint64_t rest = kMostSearches * volume.samples();
+  for (const auto& [samples, n] : boxes) {
+    if (samples > rest) break;
+    rest -= samples;
+    searched.push_back(n);
+  }
+  return searched;
+}
+
+// The values that samples of the type can have, ascending. Others are left out.
+template <class T>
+std::vector<T> samples_with(const std::vector<std::int64_t>& values) {
   std::vector<T> own;
   for (const std::int64_t value : values) {
     if (std::in_range<T>(value)) own.push_back(static_cast<T>(value));
   }
-  const auto classify = [=](std::uint32_t y, std::uint32_t z, std::uint64_t* out) {
-    const std::size_t row = (std::size_t{z + low[2]} * lattice.dims.y + y + low[1]);
-    const T* samples = lattice.samples + row * lattice.dims.x + low[0];
-    for (std::uint32_t begin = 0; begin < size[0]; begin += mesh::kFlagBits) {
-      const auto count = std::min<std::uint32_t>(mesh::kFlagBits, size[0] - begin);
-      std::uint64_t word = 0;
-      for (const T value : own) {
-        for (std::uint32_t x = 0; x < count; ++x) {
-          word |= std::uint64_t{samples[begin + x] == value} << x;
-        }
-      }
-      *out++ = word;
+  std::ranges::sort(own);
+  return own;
+}
+
+// The bits of the samples, 64 at most, that have one of the values.
+template <class T>
+std::uint64_t bits_of(std::span<const T> samples, const std::vector<T>& values) {
+  std::uint64_t bits = 0;
+  if (values.size() == 1) {
+    for (std::size_t x = 0; x < samples.size(); ++x) {
+      bits |= std::uint64_t{samples[x] == values.front()} << x;
+    }
+    return bits;
+  }
+  // Neighbours mostly have the same value, so few of them are looked up.
+  std::uint64_t is_own = 0;
+  for (std::size_t x = 0; x < samples.size(); ++x) {
+    if (x == 0 || samples[x] != samples[x - 1]) {
+      is_own = std::ranges::binary_search(values, samples[x]) ? 1 : 0;
+    }
+    bits |= is_own << x;
+  }
+  return bits;
+}
+
+template <class T>
+mesh::SignRows rows_of(const mesh::Lattice<T>& lattice, const Box& box,
+                       const std::vector<std::int64_t>& values) {
+  const auto& [low, size] = box;
+  const auto classify = [lattice, box, own = samples_with<T>(values)](
+                            std::uint32_t y, std::uint32_t z, std::uint64_t* out) {
+    const mesh::Dims& dims = lattice.dims;
+    const std::size_t row = std::size_t{z + box.low[2]} * dims.y + y + box.low[1];
+    const std::span samples(lattice.samples + row * dims.x + box.low[0], box.size[0]);
+    for (std::size_t begin = 0; begin < samples.size(); begin += mesh::kFlagBits) {
+      const std::size_t count = std::min<std::size_t>(mesh::kFlagBits, samples.size() - begin);
+      *out++ = bits_of<T>(samples.subspan(begin, count), own);
     }
   };
   return {.dims = {size[0], size[1], size[2]},
@@ -139,11 +198,14 @@ std::vector<Note> notes_on_thin_walls(const SampleArray& samples,
     using T = decltype(sample);
     if constexpr (std::is_integral_v<T>) {
       const auto lattice = lattice_of<T>(samples);
-      mesh::parallel_for(context, labels.size(), [&](std::size_t n) {
+      const auto searched = searched_labels(labels, lattice.dims);
+      mesh::parallel_for(context, searched.size(), [&](std::size_t at) {
+        const std::size_t n = searched[at];
         const auto values = parameters.label_values.find(labels[n].label);
         const std::vector<std::int64_t> own =
             values == parameters.label_values.end() ? std::vector{labels[n].label} : values->second;
-        found[n] = find_thin_walls(rows_of(lattice, labels[n], own), scheme, others, context);
+        found[n] = find_thin_walls(rows_of(lattice, box_of(labels[n], lattice.dims), own), scheme,
+                                   others, context);
       });
     }
   });

@@ -18,7 +18,9 @@ namespace isomesh::jobs {
 std::vector<Note> notes_on_thin_walls(const SampleArray& samples, const MeshRequest& request,
                                       const mesh::Context& context);
 
-// The same for each label's own surface, in the box of its samples. `labels`: all of the job.
+// The same for each label's own surface, in the box of its samples. `labels`: all of the job. The
+// smallest boxes are searched, as long as all together have at most four times the samples of the
+// volume, so time is bounded however many labels overlap.
 std::vector<Note> notes_on_thin_walls(const SampleArray& samples,
                                       std::span<const mesh::LabelVoxels> labels,
                                       const MeshParameters& parameters,

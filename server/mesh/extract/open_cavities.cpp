@@ -1,6 +1,7 @@
 // Regions are found by runs of outside samples in rows: a run is joined with the runs of the rows
 // before it. Slabs of planes are swept by themselves, and joined in their order at the planes that
-// two of them share. So the memory is that of two planes' runs for each slab, and of the nodes.
+// two of them share. So the memory is that of the runs of two planes, and of as many of centres,
+// for each slab, of those planes that threads are at, and of the nodes.
 #include "server/mesh/extract/open_cavities.h"
 
 #include <algorithm>
@@ -69,6 +70,13 @@ struct Plane {
   std::vector<Run> runs;
   std::vector<std::size_t> ends;  // of each row, in `runs`
 
+  std::size_t bytes() const { return runs.size() * sizeof(Run) + ends.size() * sizeof ends[0]; }
+
+  void shrink_to_fit() {
+    runs.shrink_to_fit();
+    ends.shrink_to_fit();
+  }
+
   std::span<Run> row(std::size_t y) {
     if (y >= ends.size()) return {};
     const std::size_t begin = y == 0 ? 0 : ends[y - 1];
@@ -136,26 +144,39 @@ bool joins(Scheme scheme, const Run& from, const Run& to, const RowStep& step, u
   return begin < end && (end - begin > 1 || is_even(begin));
 }
 
+// Sums over all slabs, which only rise: if they exceed a bound does not depend on their order.
+struct Held {
+  std::atomic<std::size_t> starts = 0;  // of regions
+  std::atomic<std::size_t> bytes = 0;   // of runs that are kept for the slabs beside
+
+  bool is_too_much() const { return starts > kMostRegionStarts || bytes > kMostRunBytes; }
+};
+
 // The regions of a slab of planes, or of several that follow each other.
 class Regions {
  public:
   Regions(const SignRows& rows, std::span<const Scheme> schemes)
       : rows_(rows), schemes_(schemes), lattices_(schemes.size()) {}
 
-  // Sweeps the planes [begin, end), and the one behind them, which is not counted. Adds the starts
-  // of regions to those of all slabs, and ends early if they are too many.
-  void sweep(std::uint32_t begin, std::uint32_t end, std::atomic<std::size_t>& starts) {
+  // Sweeps the planes [begin, end), and the one behind them, which is not counted. Adds what it
+  // holds to that of all slabs, and ends early if that is too much.
+  void sweep(std::uint32_t begin, std::uint32_t end, Held& held) {
     const std::uint32_t last = std::min(end, rows_.dims.z - 1);
-    for (std::uint32_t z = begin; z <= last && starts <= kMostRegionStarts; ++z) {
+    for (std::uint32_t z = begin; z <= last && !held.is_too_much(); ++z) {
       const std::size_t before = samples_.size();
       add_plane(z, z < end);
       if (z > begin && bcc()) add_centres(z - 1);
       if (z == begin) first_ = now_;
       if (z == begin + 1) first_centres_ = centres_;
-      if (z < end) starts += samples_.size() - before;
+      if (z < end) held.starts += samples_.size() - before;
     }
     before_ = {};
     signs_ = {};
+    signs_before_ = {};
+    for (Plane* plane : {&first_, &first_centres_, &now_, &centres_}) {
+      plane->shrink_to_fit();
+      held.bytes += plane->bytes();
+    }
   }
 
   // Adds the slab behind this one, whose first plane is this one's last.
@@ -360,14 +381,14 @@ CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes
   if (!rows.classify || !rows.dims.has_cells()) return none;
   const std::size_t slabs = chunks_of(rows.dims.z, kSlabPlanes);
   std::vector<std::optional<Regions>> parts(slabs);
-  std::atomic<std::size_t> starts = 0;
+  Held held;
   parallel_for(context, slabs, [&](std::size_t slab) {
     const auto begin = static_cast<std::uint32_t>(slab) * kSlabPlanes;
     const std::uint32_t end = std::min(begin + kSlabPlanes, rows.dims.z);
-    parts[slab].emplace(rows, schemes).sweep(begin, end, starts);
+    parts[slab].emplace(rows, schemes).sweep(begin, end, held);
   });
   context.throw_if_stopped();
-  if (starts > kMostRegionStarts) return none;
+  if (held.is_too_much()) return none;
   Regions& whole = *parts.front();
   for (std::size_t slab = 1; slab < slabs; ++slab) {
     whole.append(*parts[slab]);

@@ -56,6 +56,12 @@ inline constexpr std::uint64_t kLeastCavity = 8;
 // memory is bounded.
 inline constexpr std::size_t kMostRegionStarts = std::size_t{1} << 20;
 
+// The most bytes of runs that a search holds between slabs of 32 planes: those of the planes at
+// both of their ends, and of centres beside them. A volume of 2048 x 2048 x 2048 samples has so
+// many with 42 runs a row. With more of them nothing is counted. Each thread also has the runs of
+// up to five planes.
+inline constexpr std::size_t kMostRunBytes = std::size_t{1} << 27;
+
 struct CavityCount {
   struct Open {
     std::uint64_t cavities = 0;
@@ -71,8 +77,8 @@ struct CavityCount {
 };
 
 // Counts the cavities, and those that each of the schemes leaves open. The signs alone decide that.
-// None in noise, see kMostRegionStarts. Does not depend on the number of threads. Throws Error
-// kCancelled.
+// None in noise, see kMostRegionStarts and kMostRunBytes. Does not depend on the number of threads.
+// Throws Error kCancelled.
 CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes,
                            const Context& context);
 

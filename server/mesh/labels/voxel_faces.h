@@ -10,8 +10,8 @@
 
 namespace isomesh::mesh {
 
-// How many faces the voxels of two parts share, by the parts of WallSides: `front` is the smaller
-// number. Only of parts that share some.
+// The number of faces that the voxels of two parts share, by the parts of WallSides: `front` is the
+// smaller number. Parts that share none are left out.
 using VoxelFaces = std::map<WallSides, std::uint64_t>;
 
 // Counts the faces between all samples, each of which stands for a voxel, in one walk. Voxels that

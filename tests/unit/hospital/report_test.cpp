@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "server/hospital/objects/measurement_report.h"
+#include "server/hospital/orders/make_objects.h"
 #include "server/hospital/orders/measure_surfaces.h"
 #include "tests/unit/hospital/fixture.h"
 
@@ -104,6 +105,29 @@ class ReportingOrdersTest : public OrdersTest {
     return submit(request);
   }
 };
+
+TEST(DescriptionOfAJob, TellsWhichSideOfTheIsoValueIsInside) {
+  Job job;
+  job.mesh.emplace();
+  job.parameters.iso = 300;
+  job.parameters.passes = 5;
+  EXPECT_EQ(description_of(job), "iso 300, scheme 6, 5 passes");
+  job.parameters.inside = Inside::kBelow;
+  EXPECT_EQ(description_of(job), "below 300, scheme 6, 5 passes");
+  job.parameters.iso.reset();
+  EXPECT_EQ(description_of(job), "below otsu, scheme 6, 5 passes");
+  job.parameters.iso = -1234.56789012345;
+  job.mesh->certificate.emplace().bound_mm = 123.4567;
+  EXPECT_THAT(description_of(job), testing::StartsWith("below -1234.56789012345, scheme 6, "));
+  EXPECT_LE(description_of(job).size(), 64U);
+}
+
+TEST(TextOfMeasurements, TellsAnOpenSurfaceFromOneThatIsInsideOut) {
+  dicom::MeasuredSurface surface = {.name = "Bone", .area_mm2 = 2, .diameter_mm = 3};
+  EXPECT_EQ(text_of({surface}), " Bone open 2 3\n");
+  surface.is_inside_out = true;
+  EXPECT_EQ(text_of({surface}), " Bone inside out 2 3\n");
+}
 
 TEST_F(ReportingOrdersTest, SendOneReportAndAskForItsBound) {
   const std::string id = submit_report();

@@ -275,7 +275,7 @@ std::string sagittal_file(int slice) {
       element(0x7FE0, 0x10, "OW", std::string(std::size_t{3} * 5 * 2, '\1')));
 }
 
-// Where samples of the label are, in LPS.
+// The places of the label's samples, in LPS.
 std::set<std::array<double, 3>> places_of(std::uint8_t label, const Volume& volume,
                                           const std::string& canonical) {
   std::set<std::array<double, 3>> places;

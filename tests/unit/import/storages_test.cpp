@@ -199,7 +199,7 @@ bool are_same(const Surface& one, const Surface& other, double tolerance) {
   return triangles_at(places, one) == triangles_at(places, other);
 }
 
-// The storages that give another surface, or other samples, than the first one.
+// Counts the storages that give another surface, or other samples, than the first one.
 struct Differing {
   int surfaces = 0;
   int samples = 0;

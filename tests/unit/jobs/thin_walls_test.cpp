@@ -117,5 +117,36 @@ TEST_F(ThinWallsTest, OfLabelsAreTold) {
   EXPECT_THAT(joined.notes, ElementsAre(says("Label 9: 1 cavity of ")));
 }
 
+// Labels at opposite corners have boxes as large as the volume.
+TEST_F(ThinWallsTest, OfLabelsAreLookedForFromTheSmallestBoxUntilTimeIsSpent) {
+  const std::vector<Ball> all = {{.x = 15.6, .wall = 1.5, .value = 9},
+                                 {.x = 79.6, .wall = 1.5, .value = 10}};
+  const auto with_large_labels = [&](std::uint8_t others) {
+    auto samples = balls(all);
+    const auto [x, y, z] = samples.dims;
+    const auto spread = [&](std::uint8_t value, std::uint32_t i, std::uint32_t j) {
+      samples.at(i, j, 0) = value;
+      samples.at(x - 1 - i, y - 1 - j, z - 1) = value;
+    };
+    spread(9, 0, 0);
+    for (std::uint8_t n = 1; n <= others; ++n) spread(n, n % 2, n / 2);
+    const Volume volume = add(samples, SampleType::kUint8);
+    return made(volume, label_parameters({}), SchemeName::kSix).notes;
+  };
+  EXPECT_THAT(with_large_labels(2),
+              ElementsAre(says("Label 9: 1 cavity of "), says("Label 10: 1 cavity of ")));
+  EXPECT_THAT(with_large_labels(3), ElementsAre(says("Label 10: 1 cavity of ")));
+}
+
+// A list may have values that no sample has, and that the type cannot have.
+TEST_F(ThinWallsTest, OfALabelOfManyValuesAreTold) {
+  const Volume volume = add_balls({{.x = 15.6, .wall = 1.5, .value = 9, .within = 4},
+                                   {.x = 79.6, .wall = 1.5, .value = 7, .within = 4}});
+  JobParameters parameters = label_parameters({});
+  parameters.label_values[20] = {250, 9, 300, 7, -1, 8};
+  const MeshSummary six = made(volume, parameters, SchemeName::kSix);
+  EXPECT_THAT(six.notes, ElementsAre(says("Label 20: 2 cavities of ")));
+}
+
 }  // namespace
 }  // namespace isomesh::jobs

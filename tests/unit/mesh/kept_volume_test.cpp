@@ -159,7 +159,7 @@ TEST(KeptVolume, LeavesEachWallWithinTheBoundBothWaysAndEachLabelClosed) {
   }
 }
 
-// What is flat loses no volume, so nothing there moves.
+// A flat part loses no volume, so nothing there moves.
 TEST(KeptVolume, MovesNothingOfABox) {
   auto volume = test::constant<std::uint8_t>(0, {20, 20, 20});
   for (std::uint32_t k = 5; k < 15; ++k) {

@@ -405,6 +405,26 @@ TEST(OpenCavities, AreNotCountedInNoiseSoThatMemoryIsBounded) {
   EXPECT_LE(peak.bytes(), kMostRegionStarts * kBytesPerStart);
 }
 
+// Planes at the ends of slabs are stripes of few regions, and the others are inside.
+TEST(OpenCavities, AreNotCountedBetweenTooManyRunsSoThatMemoryIsBounded) {
+  constexpr std::uint32_t kSlab = 32;
+  const auto count = [](std::uint32_t slabs) {
+    constexpr std::uint32_t kWords = 64;
+    const auto classify = [](std::uint32_t y, std::uint32_t z, std::uint64_t* out) {
+      constexpr std::uint64_t kStripes = 0x5555'5555'5555'5555;
+      std::fill_n(out, kWords, z % kSlab == 0 ? kStripes : ~std::uint64_t{0});
+      if (y == 3 && z == 3) out[0] = 0xFF;  // a cavity of 56 samples
+    };
+    const SignRows rows = {.dims = {kWords * 64, 128, slabs * kSlab + 1}, .classify = classify};
+    return count_cavities(rows, std::array{Scheme::kSix}, {}).cavities;
+  };
+  EXPECT_EQ(count(18), 1U);
+  const test::ThreadCount threads(2);  // each has planes of its own
+  test::HeapPeak peak;
+  EXPECT_EQ(count(60), 0U);
+  EXPECT_LE(peak.bytes(), 2 * kMostRunBytes);
+}
+
 TEST(OpenCavities, StopWhenTheyAreCancelled) {
   std::stop_source stop;
   stop.request_stop();

@@ -249,7 +249,7 @@ TEST(SmoothWallsShape, TwoLabelsAreSmoothedAsAnIsosurfaceIs) {
   }
 }
 
-// Where all corners of a triangle are on curves and in line, one is moved by about its rounding.
+// A corner may be moved by about its rounding if its triangle's corners lie on curves and in line.
 bool is_where_it_was(const Vec3& after, const Vec3& before) {
   constexpr float kLargest = 64;  // coordinate of these volumes
   return std::ranges::equal(

@@ -130,7 +130,7 @@ def _finite(samples: Any, notes: List[Any]) -> Tuple[Any, int]:
     text = f"{count} of the {samples.size} samples are not finite numbers"
     if count == samples.size:
         raise ValueError(f"{text}.")
-    text += ". At iso-values above the smallest sample they lie outside the surface."
+    text += ". At iso-values above the smallest sample they lie outside the surface, or inside it with inside=below."
     notes.append({"code": "non-finite-samples", "detail": text})
     return numpy.asfortranarray(numpy.where(finite, samples, samples[finite].min())), count
 

@@ -86,7 +86,7 @@ void expect_left_out(const Outcome& outcome, const std::string& what = {}) {
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{kLeast, 50})) << what;
   EXPECT_EQ(note_detail(outcome, NoteCode::kPadding),
             "48 of the 192 samples have the padding value of the file. At iso-values above the "
-            "smallest sample they lie outside the surface.")
+            "smallest sample they lie outside the surface, or inside it with inside=below.")
       << what;
   // Midway between -990, the last of one class, and 40, the first of the other.
   EXPECT_EQ(outcome.volume.suggested_iso, -475) << what;
