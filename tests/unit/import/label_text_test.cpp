@@ -266,6 +266,7 @@ TEST(LabelsBeside, WithAnotherNameMakeLabelsOfFewValuesOnly) {
     samples[at] = static_cast<char>(at % 2 == 0 ? 0 : at / 2 % 100);
     if (at % 8 < 4) samples[at] = static_cast<char>(at / 8 % 100);
   }
+  samples[799] = '\0';  // the first one, as NIfTI counts from the right and from the front
   const std::string volume = nifti({.dim = {3, 40, 20, 10, 1, 1, 1, 1}}, samples);
   EXPECT_THAT(codes_of(imported(import_bytes(zip({{"ct.nii", volume}, {"labels.txt", all}})))),
               IsEmpty());

@@ -16,6 +16,8 @@ namespace isomesh::import::test {
 namespace {
 
 using testing::Contains;
+using testing::DoubleNear;
+using testing::Each;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using Vector = std::array<double, 3>;
@@ -170,8 +172,10 @@ TEST(Cube, TurnsBohrIntoAngstromAndTheLastAxisRunsFastest) {
   constexpr double kBohr = 0.529177210903;
   const Outcome outcome = imported(import_bytes(cube({.atoms = "1 1 2 3"}, counted(24))));
   EXPECT_EQ(outcome.volume.dims, (Dims{2, 3, 4}));
-  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{kBohr, kBohr, kBohr}));
-  EXPECT_EQ(outcome.volume.geometry.origin, (Vector{kBohr, 2 * kBohr, 3 * kBohr}));
+  const auto is_nearly = [](double place) { return DoubleNear(place, 1e-6); };
+  EXPECT_THAT(outcome.volume.geometry.spacing, Each(is_nearly(kBohr)));
+  EXPECT_THAT(outcome.volume.geometry.origin,
+              ElementsAre(is_nearly(kBohr), is_nearly(2 * kBohr), is_nearly(3 * kBohr)));
   const std::vector<float> samples = samples_of<float>(outcome);
   EXPECT_EQ(samples[1], 12);  // one step along x
   EXPECT_EQ(samples[2], 4);   // one step along y
