@@ -17,7 +17,7 @@ import isomesh_client
 import nibabel
 import numpy
 from limits import LimitedTest
-from support import DaemonTest, ball
+from support import DaemonTest, ball, thin_shell
 
 
 def tetrahedron(labels=None):
@@ -343,6 +343,9 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         self.assertTrue(job["mesh"]["empty"])
         self.assertRaises(isomesh_client.EmptySurface, self.client.fetch, job)
         self.assertRaises(isomesh_client.EmptySurface, self.client.download, job["id"], file)
+        without = self.client.wait(self.client.submit(job["volume"], iso=1e6, formats=["glb"]))
+        self.assertRaises(isomesh_client.EmptySurface, self.client.fetch, without)
+        self.assertRaises(isomesh_client.EmptySurface, self.client.download, without, file)
         self.assertFalse(file.exists())
         self.assertEqual(len(self.client.fetch(job, allow_empty=True).faces), 0)
         (result,) = self.client.mesh_all([ball()], to=lambda _: file, iso=1e6)
@@ -408,6 +411,16 @@ class Notes(DaemonTest):
         self.assertEqual(mesh.in_space("ras").notes, mesh.notes)
         self.client.erase(volume)
         self.assertEqual(list(self.client.fetch(mesh.job).notes), [])
+
+    def test_a_note_on_the_mesh_follows_those_on_its_volume(self):
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, r"^the mesh: 1 cavity .*\(thin-walls\)$"):
+            mesh = self.client.mesh(thin_shell(), iso=0.5, close=True, scheme=6)
+        codes = [note["code"] for note in mesh.notes]
+        self.assertEqual(codes.count("thin-walls"), 1)
+        self.assertEqual(codes[-1], "thin-walls")
+        self.assertEqual(self.client.fetch(mesh.job).notes, mesh.notes)
+        self.client.erase(mesh.job["volume"])
+        self.assertEqual([note["code"] for note in self.client.fetch(mesh.job).notes], ["thin-walls"])
 
     def test_a_script_prints_the_warning_with_its_line(self):
         script = self.folder / "script.py"
