@@ -50,14 +50,6 @@ class Arrays(LimitedTest):
         with self.assertRaisesRegex(ValueError, "'ras' or 'lps', not 'mni'"):
             mesh.in_space("mni")
 
-    def test_the_space_of_a_file_is_read_from_its_comment(self):
-        file = self.folder / "ras.ply"
-        data = tetrahedron().in_space("ras").save(file).read_bytes()
-        self.assertIn(b"\ncomment isomesh, millimetres, SPACE=RAS\n", data)
-        for told, space in ((b"millimetres, RAS", "ras"), (b"angstrom, SPACE=RAS", "ras"), (b"millimetres, LPS", "lps")):
-            file.write_bytes(data.replace(b"millimetres, SPACE=RAS", told))
-            self.assertEqual(isomesh_client.read_ply(file).space, space)
-
     def test_bounds(self):
         self.assertEqual(tetrahedron().bounds.tolist(), [[0, 0, 0], [2, 3, 4]])
         self.assertEqual(tetrahedron().in_space("ras").bounds.tolist(), [[-2, -3, 0], [0, 0, 4]])
@@ -85,6 +77,14 @@ class PlyFiles(LimitedTest):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
+
+    def test_the_space_of_a_file_is_read_from_its_comment(self):
+        file = self.folder / "ras.ply"
+        data = tetrahedron().in_space("ras").save(file).read_bytes()
+        self.assertIn(b"\ncomment isomesh, millimetres, SPACE=RAS\n", data)
+        for told, space in ((b"millimetres, RAS", "ras"), (b"angstrom, SPACE=RAS", "ras"), (b"millimetres, LPS", "lps")):
+            file.write_bytes(data.replace(b"millimetres, SPACE=RAS", told))
+            self.assertEqual(isomesh_client.read_ply(file).space, space)
 
     def test_a_ply_file_has_the_arrays_as_they_are(self):
         for labels in (None, numpy.array([1, 1, -2, 2], "int32"), numpy.array([1, 2, 3, 4294967295], "uint32")):

@@ -64,7 +64,7 @@ describe('the distance from the extracted surface', () => {
     expect(from({ reference: 'smoothed', bound_mm: 0.2, found_mm: 0.1 })).toEqual({ mm: 0.5, proven: true });
     expect(from({ reference: 'smoothed', found_mm: 0.1 })).toEqual({ mm: 0.4, proven: false });
     expect(from({ reference: 'extracted', bound_mm: 0.2, found_mm: 0.1 })).toEqual({ mm: 0.2, proven: true });
-    expect(fromExtracted({ displacement_mm } as never)).toBeNull();
+    expect(fromExtracted({ displacement_mm })).toBeNull();
   });
 
   it('names the surface that it was measured from', () => {
