@@ -120,9 +120,8 @@ constinit const Parameter kIso = {
         "the volume's presets.",
     .more =
         "A sample is inside when its value is >= iso; see `inside`. A CT in Hounsfield units has "
-        "`skin`, "
-        "`soft-tissue` and `bone`, a fractional segmentation has `segment`, if the value occurs "
-        "in it. The job then has the preset's number.",
+        "`skin`, `soft-tissue` and `bone`, a fractional segmentation has `segment`, if the value "
+        "occurs in it. The job then has the preset's number.",
     .when_empty = "otsu",
     .takes_presets = true,
     .is_required = true,
@@ -207,12 +206,11 @@ constinit const Parameter kScheme = {
     .title = "Tetrahedra per cell",
     .help = "Number of tetrahedra per cell, or lattice.",
     .more =
-        "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision "
-        "of the face-centred cubic lattice: every second cell is mirrored; "
-        "the cell (0,0,0) is not. The names `kuhn` and `fcc` mean 6 and 5. `bcc` is "
-        "the body-centred cubic lattice, which has a sample in the centre of each "
-        "cell, too, the mean of its corners: 1.4 times as many triangles as 6, with "
-        "larger angles. It is not for labels.",
+        "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision of the "
+        "face-centred cubic lattice: every second cell is mirrored; the cell (0,0,0) is not. The "
+        "names `kuhn` and `fcc` mean 6 and 5. `bcc` is the body-centred cubic lattice, which has a "
+        "sample in the centre of each cell, too, the mean of its corners: 1.4 times as many "
+        "triangles as 6, with larger angles. It is not for labels.",
     .values = {"The face-centred lattice, with fewer triangles; every second cell is "
                "mirrored",
                "The primitive lattice, with the same split in every cell", "The same as 5",
@@ -234,12 +232,11 @@ constinit const Parameter kRegularize = {
     .title = "Join nearby vertices",
     .help = "Join the vertices around a sample where that keeps the topology.",
     .more =
-        "The surface has about a third as many triangles, with larger angles. It "
-        "keeps its connected components, its boundary and its genus. Vertices at "
-        "the volume's border stay where they are. The same holds for the own "
-        "surface of each label. False gives a vertex to each edge between two "
-        "samples that the surface crosses. At an iso-value, `max_error_mm` does "
-        "the same: its limit is measured from that surface.",
+        "The surface has about a third as many triangles, with larger angles. It keeps its "
+        "connected components, its boundary and its genus. Vertices at the volume's border stay "
+        "where they are. The same holds for the own surface of each label. False gives a vertex to "
+        "each edge between two samples that the surface crosses. At an iso-value, `max_error_mm` "
+        "does the same: its limit is measured from that surface.",
     .may_be_absent = true};
 
 constinit const Parameter kPasses = {
@@ -248,9 +245,8 @@ constinit const Parameter kPasses = {
     .help = "Number of smoothing passes.",
     .more =
         "Vertices on the surface's boundary stay where they are. `labels` smoothes once, whatever "
-        "their number, and moves "
-        "the boundary within the volume's border; 0 leaves the surface as it is "
-        "extracted.",
+        "their number, and moves the boundary within the volume's border; 0 leaves the surface as "
+        "it is extracted.",
     .minimum = 0,
     .maximum = 1000,
 };
@@ -318,13 +314,10 @@ constinit const Parameter kComponents = {
     .help = "Which connected components to keep; the others are dropped before smoothing.",
     .more =
         "With several members, `nearest_to` chooses first, `min_triangles` drops some of these, "
-        "and "
-        "`keep` chooses among the rest. Components are ranked by their number of triangles, equal "
-        "ones by "
-        "their first vertex. Without members all are kept. Labels do not allow it.",
+        "and `keep` chooses among the rest. Components are ranked by their number of triangles, "
+        "equal ones by their first vertex. Without members all are kept. Labels do not allow it.",
     .by_labels =
-        "cannot be combined with labels: a dropped component would leave a hole in its "
-        "neighbours"};
+        "cannot be combined with labels: a dropped component would leave a hole in its neighbours"};
 
 constinit const Parameter kFillCavities = {
     .name = "fill_cavities",

@@ -102,6 +102,7 @@ int fetch(Client& client, const Options& options) {
     print_json(job_json(job, paths_of(job, outputs, options.label), seen));
   } else if (job.mesh && !options.quiet) {
     print(outputs_report(job, outputs, options.label));
+    tell_notes(job.mesh->notes, options, "");
   }
   return kDone;
 }

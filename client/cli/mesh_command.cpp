@@ -286,8 +286,9 @@ int MeshRun::dry_run(const JobParameters& parameters, const Task& task) {
 
 void MeshRun::report(const Job& job, const std::vector<Output>& outputs, const Task& task) {
   if (options_.json) return print_json(job_json(job, paths_of(job, outputs), seen_, task.origin));
+  if (options_.quiet) return;
   const bool has_mesh_on_stdout = std::ranges::any_of(outputs, &Output::is_stdout);
-  if (options_.quiet || has_mesh_on_stdout) return;
+  if (has_mesh_on_stdout) return tell_notes(job.mesh->notes, options_, task.subject);
   std::string text = outputs_report(job, outputs);
   if (is_one_of_many_) {
     tell_notes(job.mesh->notes, options_, task.subject);

@@ -106,7 +106,7 @@ std::string shell_word(std::string_view text) {
 }
 
 std::string with_options(std::string text) {
-  constexpr std::array<std::array<std::string_view, 2>, 8> kOptions = {
+  constexpr std::array<std::array<std::string_view, 2>, 10> kOptions = {
       {{"\"labels\": \"all\"", "--labels all"},
        {"nifti_form=", "--nifti-form "},
        {"scheme=", "--scheme "},
@@ -114,7 +114,9 @@ std::string with_options(std::string text) {
        {"series=UID", "--series UID"},
        {"volume=N", "--volume N"},
        {"spacing=X,Y,Z", "--spacing X,Y,Z"},
-       {"dims (X,Y,Z) and type", "--dims X,Y,Z and --type"}}};
+       {"dims (X,Y,Z) and type", "--dims X,Y,Z and --type"},
+       {"the box of crop", "the box of --crop"},
+       {"; close adds", "; --close adds"}}};
   for (const auto& [parameter, option] : kOptions) {
     const std::size_t at = text.find(parameter);
     if (at != std::string::npos) text.replace(at, parameter.size(), option);

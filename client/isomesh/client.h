@@ -225,7 +225,7 @@ class Client {
   // not ended, the job's own error if it failed, kCancelled if it was cancelled, kNotFound if it
   // has no file of that format, kDigestMismatch for wrong bytes. For a job by labels, `label`
   // selects one label's own surface. Writes the files that files_of_mesh() names, and an OBJ names
-  // its materials so.
+  // its materials so. The file of an empty surface has no triangles: see `job.mesh->empty`.
   void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
              const TransferProgress& progress = {},
              std::optional<std::int64_t> label = std::nullopt,

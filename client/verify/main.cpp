@@ -59,9 +59,11 @@ void add_options(CLI::App& app, Arguments& all) {
   add("--inside", all.inside, "above|below", "As in the job")
       ->check(CLI::IsMember({"above", "below"}));
   add("--crop", all.crop, "X,Y,Z,X,Y,Z", "As in the job; closes")->delimiter(',')->expected(6);
-  app.add_flag("--close", all.cut.close, "The job closed the surface at the volume's border");
-  app.add_flag("--midpoint", all.cut.midpoint, "The job had --interpolation midpoint");
-  app.add_flag("--fill-cavities", all.cut.fill, "As in the job");
+  app.add_flag("--close,!--no-close", all.cut.close,
+               "The job closed the surface at the volume's border, or did not");
+  app.add_flag("--midpoint,!--no-midpoint", all.cut.midpoint,
+               "The job had --interpolation midpoint, or linear");
+  app.add_flag("--fill-cavities,!--no-fill-cavities", all.cut.fill, "As in the job");
   add("--keep-components", all.question.components.keep, "N", "As in the job: the N largest")
       ->check(CLI::PositiveNumber);
   add("--min-component-triangles", all.question.components.min_triangles, "N", "As in the job")

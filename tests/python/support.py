@@ -63,6 +63,12 @@ class DaemonTest(LimitedTest):
             raise
 
 
+def thin_shell():
+    """A mask of a hollow ball whose wall is so thin that `scheme` 6 opens its cavity."""
+    at = numpy.indices((32, 32, 32)) - numpy.reshape([15.6, 15.3, 15.8], (3, 1, 1, 1))
+    return (numpy.abs(numpy.linalg.norm(at, axis=0) - 12) <= 0.75).astype("uint8")
+
+
 class Relay:
     """Passes connections on to a server. The first `cuts` responses that are longer than `after`
     bytes are cut there."""

@@ -257,27 +257,6 @@ class Jobs(DaemonTest):
         again = self.client.submit(volume, **parameters)
         self.assertEqual(again["parameters"], {"volume": volume["id"], **parameters})
 
-    def test_an_empty_surface_is_an_error_unless_it_is_allowed(self):
-        with self.assertRaisesRegex(isomesh_client.EmptySurface, "the surface is empty: .*; allow_empty=True") as refused:
-            self.client.mesh(ball(), iso=1e6, formats=["stl"])
-        job, file = refused.exception.job, self.folder / "none.stl"
-        self.assertTrue(job["mesh"]["empty"])
-        self.assertRaises(isomesh_client.EmptySurface, self.client.fetch, job)
-        self.assertRaises(isomesh_client.EmptySurface, self.client.download, job["id"], file)
-        self.assertFalse(file.exists())
-        self.assertEqual(len(self.client.fetch(job, allow_empty=True).faces), 0)
-        (result,) = self.client.mesh_all([ball()], to=lambda _: file, iso=1e6)
-        self.assertIsInstance(result.error, isomesh_client.EmptySurface)
-        self.assertFalse(file.exists())
-        (result,) = self.client.mesh_all([ball()], to=lambda _: file, iso=1e6, allow_empty=True)
-        self.assertEqual((result.error, file.stat().st_size), (None, 84))
-
-    def test_an_empty_surface_that_is_allowed_is_a_mesh(self):
-        mesh = self.client.mesh(ball(), iso=1e6, formats=["stl"], allow_empty=True)
-        self.assertTrue(mesh.job["mesh"]["empty"])
-        self.assertEqual(mesh.save(self.folder / "empty.stl").stat().st_size, 84)
-        self.assertEqual((mesh.vertices.shape, mesh.faces.shape), ((0, 3), (0, 3)))
-
     def test_a_cancelled_job_fails_whoever_waits(self):
         volume = self.client.upload(numpy.random.default_rng(1).random((128, 128, 96), "float32"))
         job = self.client.submit(volume, iso=0.5, passes=1000, formats=["ply"])

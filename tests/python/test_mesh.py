@@ -17,7 +17,7 @@ import isomesh_client
 import nibabel
 import numpy
 from limits import LimitedTest
-from support import DaemonTest, ball
+from support import DaemonTest, ball, thin_shell
 
 
 def tetrahedron(labels=None):
@@ -50,14 +50,6 @@ class Arrays(LimitedTest):
         with self.assertRaisesRegex(ValueError, "'ras' or 'lps', not 'mni'"):
             mesh.in_space("mni")
 
-    def test_the_space_of_a_file_is_read_from_its_comment(self):
-        file = self.folder / "ras.ply"
-        data = tetrahedron().in_space("ras").save(file).read_bytes()
-        self.assertIn(b"\ncomment isomesh, millimetres, SPACE=RAS\n", data)
-        for told, space in ((b"millimetres, RAS", "ras"), (b"angstrom, SPACE=RAS", "ras"), (b"millimetres, LPS", "lps")):
-            file.write_bytes(data.replace(b"millimetres, SPACE=RAS", told))
-            self.assertEqual(isomesh_client.read_ply(file).space, space)
-
     def test_bounds(self):
         self.assertEqual(tetrahedron().bounds.tolist(), [[0, 0, 0], [2, 3, 4]])
         self.assertEqual(tetrahedron().in_space("ras").bounds.tolist(), [[-2, -3, 0], [0, 0, 4]])
@@ -85,6 +77,14 @@ class PlyFiles(LimitedTest):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
+
+    def test_the_space_of_a_file_is_read_from_its_comment(self):
+        file = self.folder / "ras.ply"
+        data = tetrahedron().in_space("ras").save(file).read_bytes()
+        self.assertIn(b"\ncomment isomesh, millimetres, SPACE=RAS\n", data)
+        for told, space in ((b"millimetres, RAS", "ras"), (b"angstrom, SPACE=RAS", "ras"), (b"millimetres, LPS", "lps")):
+            file.write_bytes(data.replace(b"millimetres, SPACE=RAS", told))
+            self.assertEqual(isomesh_client.read_ply(file).space, space)
 
     def test_a_ply_file_has_the_arrays_as_they_are(self):
         for labels in (None, numpy.array([1, 1, -2, 2], "int32"), numpy.array([1, 2, 3, 4294967295], "uint32")):
@@ -336,6 +336,30 @@ print(json.dumps([mesh.labels.tolist(), mesh.colors.tolist()]))
         with self.assertRaisesRegex(TypeError, "not a volume"):
             self.client.mesh({"id": "x"}, iso=1)
 
+    def test_an_empty_surface_is_an_error_unless_it_is_allowed(self):
+        with self.assertRaisesRegex(isomesh_client.EmptySurface, "the surface is empty: .*; allow_empty=True") as refused:
+            self.client.mesh(ball(), iso=1e6, formats=["stl"])
+        job, file = refused.exception.job, self.folder / "none.stl"
+        self.assertTrue(job["mesh"]["empty"])
+        self.assertRaises(isomesh_client.EmptySurface, self.client.fetch, job)
+        self.assertRaises(isomesh_client.EmptySurface, self.client.download, job["id"], file)
+        without = self.client.wait(self.client.submit(job["volume"], iso=1e6, formats=["glb"]))
+        self.assertRaises(isomesh_client.EmptySurface, self.client.fetch, without)
+        self.assertRaises(isomesh_client.EmptySurface, self.client.download, without, file)
+        self.assertFalse(file.exists())
+        self.assertEqual(len(self.client.fetch(job, allow_empty=True).faces), 0)
+        (result,) = self.client.mesh_all([ball()], to=lambda _: file, iso=1e6)
+        self.assertIsInstance(result.error, isomesh_client.EmptySurface)
+        self.assertFalse(file.exists())
+        (result,) = self.client.mesh_all([ball()], to=lambda _: file, iso=1e6, allow_empty=True)
+        self.assertEqual((result.error, file.stat().st_size), (None, 84))
+
+    def test_an_empty_surface_that_is_allowed_is_a_mesh(self):
+        mesh = self.client.mesh(ball(), iso=1e6, formats=["stl"], allow_empty=True)
+        self.assertTrue(mesh.job["mesh"]["empty"])
+        self.assertEqual(mesh.save(self.folder / "empty.stl").stat().st_size, 84)
+        self.assertEqual((mesh.vertices.shape, mesh.faces.shape), ((0, 3), (0, 3)))
+
     def test_progress(self):
         seen = []
         self.client.mesh(ball(), iso=-8, progress=seen.append)
@@ -387,6 +411,16 @@ class Notes(DaemonTest):
         self.assertEqual(mesh.in_space("ras").notes, mesh.notes)
         self.client.erase(volume)
         self.assertEqual(list(self.client.fetch(mesh.job).notes), [])
+
+    def test_a_note_on_the_mesh_follows_those_on_its_volume(self):
+        with self.assertWarnsRegex(isomesh_client.VolumeWarning, r"^the mesh: 1 cavity .*\(thin-walls\)$"):
+            mesh = self.client.mesh(thin_shell(), iso=0.5, close=True, scheme=6)
+        codes = [note["code"] for note in mesh.notes]
+        self.assertEqual(codes.count("thin-walls"), 1)
+        self.assertEqual(codes[-1], "thin-walls")
+        self.assertEqual(self.client.fetch(mesh.job).notes, mesh.notes)
+        self.client.erase(mesh.job["volume"])
+        self.assertEqual([note["code"] for note in self.client.fetch(mesh.job).notes], ["thin-walls"])
 
     def test_a_script_prints_the_warning_with_its_line(self):
         script = self.folder / "script.py"

@@ -295,6 +295,23 @@ TEST_F(Commands, AnEmptySurfaceWritesNothingUnlessThatIsAccepted) {
   EXPECT_EQ(test::read_file(folder_ / "fetched.drc"), "mesh");
 }
 
+TEST_F(Commands, NotesOnTheMeshAreToldWhereverTheMeshGoes) {
+  job_.mesh->notes = {{.code = "thin-walls", .detail = "A cavity is open. scheme=5 closes it."}};
+  const std::string told = "note: A cavity is open. --scheme 5 closes it. (thin-walls)\n";
+  EXPECT_THAT(outcome_of(options_).out, HasSubstr("(thin-walls)"));
+  Options piped = options_;
+  piped.outputs = {{.path = "-", .format = MeshFormat::kDrc}};
+  const Outcome streamed = outcome_of(piped);
+  EXPECT_EQ(streamed.out, "mesh");
+  EXPECT_THAT(streamed.err, HasSubstr(told));
+  Options fetching = options_;
+  fetching.command = Command::kFetch;
+  fetching.id = "7";
+  EXPECT_THAT(outcome_of(fetching).err, HasSubstr(told));
+  fetching.quiet = piped.quiet = true;
+  EXPECT_EQ(outcome_of(fetching).err + outcome_of(piped).err, "");
+}
+
 TEST_F(Commands, EachLineOfJsonSaysItsInput) {
   const std::string good = folder_ / "head.nii";
   const std::string bad = folder_ / "bad.nii";

@@ -303,6 +303,8 @@ TEST(WithOptions, NamesTheOptionInsteadOfTheParameter) {
             "Choose one with --member NAME: \"member=NAME.nii\".");
   EXPECT_EQ(with_options("If it holds raw samples, give their dims (X,Y,Z) and type."),
             "If it holds raw samples, give their --dims X,Y,Z and --type.");
+  EXPECT_EQ(with_options("no boundary in the box of crop; close adds the border"),
+            "no boundary in the box of --crop; --close adds the border");
   EXPECT_EQ(with_options("as it is"), "as it is");
 }
 

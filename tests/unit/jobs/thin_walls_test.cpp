@@ -103,6 +103,20 @@ TEST_F(ThinWallsTest, OfGreyValuesAreToldIfCavitiesAreToBeFilled) {
   EXPECT_EQ(made(volume, parameters, SchemeName::kSix).notes.size(), 1U);
 }
 
+// A dark shell in bright surroundings, with the samples below the iso-value inside.
+TEST_F(ThinWallsTest, OfADarkMaskAreThoseOfTheBrightOne) {
+  test::SampleVolume<std::uint8_t> samples = balls({kThin, kThick});
+  const Volume bright = add(samples, SampleType::kUint8);
+  for (std::uint8_t& sample : samples.samples) sample = 1 - sample;
+  const Volume dark = add(samples, SampleType::kUint8);
+  JobParameters below = parameters_of(dark, 0.5);
+  below.inside = Inside::kBelow;
+  const MeshSummary made_below = made(dark, below, SchemeName::kSix);
+  EXPECT_THAT(made_below.notes, ElementsAre(says("1 cavity of ")));
+  EXPECT_EQ(made_below.notes, made(bright, parameters_of(bright, 0.5), SchemeName::kSix).notes);
+  EXPECT_THAT(made(dark, below, SchemeName::kFive).notes, IsEmpty());
+}
+
 // Each label by itself: what is within its wall may have another.
 TEST_F(ThinWallsTest, OfLabelsAreTold) {
   const Volume volume = add_balls({{.x = 16.6, .wall = 1.5, .value = 5, .within = 3},

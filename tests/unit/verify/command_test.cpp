@@ -89,6 +89,26 @@ TEST_F(VerifyCommand, TakesTheParametersThatAFileCarries) {
   EXPECT_EQ(status_with({}), 2);
 }
 
+TEST_F(VerifyCommand, SwitchesOffWhatAFileSwitchesOn) {
+  MeshParameters parameters = parameters_within(0.1);
+  parameters.max_error_mm.reset();
+  parameters.iso = -1.5;  // so low that the balls touch the border
+  parameters.regularize = false;
+  parameters.formats = {MeshFormat::kGlb};
+  parameters.interpolation = Interpolation::kMidpoint;
+  parameters.close = parameters.fill_cavities = true;
+  const std::string mesh = folder_ / "mesh.glb";
+  write_file(mesh, made(balls(), parameters));
+  const auto status_with = [&](const std::vector<std::string>& more) {
+    return run(with({ISOMESH_VERIFY, mesh, "--volume", volume_, "--bound", "0.01"}, more)).status;
+  };
+  EXPECT_EQ(status_with({}), 0);
+  EXPECT_EQ(status_with({"--close", "--midpoint", "--fill-cavities"}), 0);
+  for (const char* off : {"--no-close", "--no-midpoint", "--no-fill-cavities"}) {
+    EXPECT_EQ(status_with({off}), 1) << off;
+  }
+}
+
 TEST_F(VerifyCommand, EndsWithStatusTwoWhereItCannotTell) {
   const auto expect_refused = [&](const std::vector<std::string>& more, const char* text) {
     const Finished end = verified(more);

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { emptyReason } from '@/api/problem';
 import { changeOf } from '@/job/changes';
 import { millimetres } from '@/ui/format';
-import { histogramPath, untangledText } from '@/views/jobs/certificate';
+import { fromExtracted, histogramPath, referenceText, untangledText } from '@/views/jobs/certificate';
 import { stepsOf, totalOf } from '@/views/jobs/charts';
 import { errorAt, errorInWords, placeOf } from '@/views/prepare/error_slider';
 import { keepOnlyAt } from '@/views/surface/component_list';
@@ -53,6 +53,23 @@ describe('a certificate', () => {
     const [, last] = places.at(-2) ?? [];
     expect(last).toBeLessThan(64 - 5);
     expect(histogramPath({ points: 1, max_mm: 0, mean_mm: 0, rms_mm: 0, p99_mm: 0, histogram }, 1, 99)).toBe('');
+  });
+});
+
+describe('the distance from the extracted surface', () => {
+  const displacement_mm = { max: 0.3, mean: 0.1 };
+  const from = (certificate: object): unknown => fromExtracted({ certificate, displacement_mm } as never);
+
+  it('has what smoothing moved, if it was measured from the smoothed surface', () => {
+    expect(from({ reference: 'smoothed', bound_mm: 0.2, found_mm: 0.1 })).toEqual({ mm: 0.5, proven: true });
+    expect(from({ reference: 'smoothed', found_mm: 0.1 })).toEqual({ mm: 0.4, proven: false });
+    expect(from({ reference: 'extracted', bound_mm: 0.2, found_mm: 0.1 })).toEqual({ mm: 0.2, proven: true });
+    expect(fromExtracted({ displacement_mm })).toBeNull();
+  });
+
+  it('names the surface that it was measured from', () => {
+    expect(referenceText({ reference: 'smoothed' })).toBe('smoothed surface');
+    expect(referenceText({ reference: 'extracted' })).toBe('extracted surface');
   });
 });
 

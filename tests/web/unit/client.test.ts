@@ -107,7 +107,7 @@ describe('the labels of a job', () => {
 
   it('have walls, which come from all pages', async () => {
     expect((await client.wallsOfJob(id)).map(({ b }) => b)).toEqual([null, 4]);
-    expect((await client.wallsOfJob(id, undefined, true)).map(({ b }) => b)).toEqual([null, 4, 5]);
+    expect((await client.wallsOfJob(id, undefined, { edgeContacts: true })).map(({ b }) => b)).toEqual([null, 4, 5]);
   });
 });
 
@@ -147,6 +147,7 @@ describe('the mesh of a job', () => {
     const error = await rejectionOf(client.meshOf(empty, 'stl'));
     expect(error).toMatchObject({ status: 422, detail: 'The surface is empty: it has none. The option allowEmpty accepts that.' });
     expect(adviceFor(error as ApiError)).toBe('');
+    expect(await rejectionOf(client.meshOf(empty, 'glb'))).toMatchObject({ status: 422 });
     expect((await client.meshOf(empty, 'stl', undefined, { allowEmpty: true })).byteLength).toBeGreaterThan(0);
   });
 });

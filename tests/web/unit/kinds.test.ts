@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { kindOf, withKind } from '@/job/kinds';
 import { defaultParameters } from '@/job/parameters';
+import { isForPrinting } from '@/job/printing';
 import { withLabels } from '@/job/table';
 
 const defaults = defaultParameters('a', 60);
@@ -34,5 +35,15 @@ describe('the kinds of a surface', () => {
     expect(printedLabels).toMatchObject({ smoothing: 'labels', max_error_mm: 0.2, components: labels.components });
     expect(printedLabels.fill_cavities).toBe(labels.fill_cavities);
     expect(withKind(printedLabels, 'smooth', spacing)).toEqual(labels);
+  });
+});
+
+describe('a surface that was made for a printer', () => {
+  it('is one for it if it encloses a volume, which a closed one that is inside out does not', () => {
+    const parameters = withKind(defaults, 'printing', spacing);
+    const made = (quality: object): boolean => isForPrinting({ parameters, mesh: { quality } } as never);
+    expect(made({ closed: true, oriented: true, encloses_volume: true })).toBe(true);
+    expect(made({ closed: true, oriented: true, encloses_volume: false })).toBe(false);
+    expect(isForPrinting({ parameters, mesh: null } as never)).toBe(false);
   });
 });

@@ -90,6 +90,7 @@ describe('snippets', () => {
     expect(text).not.toContain('Authorization');
     expect(librarySnippet('http://h:1', other, false)).toContain(body);
     expect(librarySnippet('http://h:1', other, true)).toContain('getenv("ISOMESH_TOKEN")');
+    expect(librarySnippet('http://h:1', other, false)).toMatch(/job\.mesh->empty\) throw .*\nclient\.fetch\(/);
   });
 
   it('are programs in Python and JavaScript', () => {

@@ -145,8 +145,10 @@ def _mesh_of(run: Run, made: Any, job: Any, notes: List[Any]) -> Mesh:
     if job["mesh"].get("certificate"):
         # The rest is measured on files. What is proven holds for the arrays as well.
         of_files = job["mesh"]["certificate"]
-        job["mesh"]["certificate"] = {name: of_files[name] for name in ("reference", "proven", "bound_mm", "why_unproven") if name in of_files}
+        proven = ("reference", "proven", "bound_mm", "why_unproven")
+        job["mesh"]["certificate"] = {name: of_files[name] for name in proven if name in of_files}
     vertices = run.array(made.vertices, points, "float32", 3)
+    notes = [*notes, *job["mesh"].get("notes", [])]
     return Mesh(vertices, run.array(made.triangles, faces, "uint32", 3), labels, "lps", job, notes, None, colors)
 
 

@@ -722,8 +722,8 @@ class MeshSummary(TypedDict):
 
     #: The iso-value that was used, also for Otsu's. Left out for a job by labels.
     iso: NotRequired[float]
-    #: There is no surface: the iso-value is outside the samples' range, or no connected component
-    #: remained. The job succeeds all the same, and its files have no triangles.
+    #: There is no surface; see empty_reason. The job succeeds all the same, and its files have no
+    #: triangles.
     empty: bool
     #: The reason, with the range of the volume's samples and its suggested iso-value if they help.
     #: Only for an empty surface. A job of an older server does not have it.

@@ -119,8 +119,8 @@ class Client(Batches):
         `help(isomesh_client.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
         besides `.ply`.
 
-        Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The volume's
-        notes are in `mesh.notes`, and each of them gives a VolumeWarning. Raises JobFailed if the job
+        Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The notes on the volume
+        and on the mesh are in `mesh.notes`, and each of them gives a VolumeWarning. Raises JobFailed if the job
         fails, and EmptySurface if there is no surface. An interrupt (Ctrl-C) cancels the job.
         """
         keywords = locals()
@@ -357,11 +357,11 @@ class Client(Batches):
     # --- Meshes ----------------------------------------------------------------------------------
 
     def fetch(self, job: Union[str, AnyJob], *, allow_empty: bool = False) -> Mesh:
-        """The mesh of a succeeded job as arrays. The job's `formats` must include "ply". `mesh.notes`
-        is empty if the volume is no longer stored. Raises EmptySurface as `mesh` does."""
+        """The mesh of a succeeded job as arrays. The job's `formats` must include "ply". If the volume is no longer
+        stored, `mesh.notes` has only those on the mesh. Raises EmptySurface as `mesh` does."""
         done = self.job(job) if isinstance(job, str) else job
-        file_of(done, "ply")
         expect_surface(done, allow_empty)
+        file_of(done, "ply")
         notes: Sequence[api.Note] = ()
         with contextlib.suppress(Refused):
             notes = self.volume(done["volume"])["notes"]
@@ -378,11 +378,11 @@ class Client(Batches):
         target = Path(path)
         done = self.job(job) if isinstance(job, str) else job
         form = format_of(target)
+        expect_surface(done, allow_empty)
         labels: Iterable[api.LabelSummary] = ()
         if label is not None and done["mesh"] is not None:
             labels = done["mesh"].get("labels") or self.job_labels(done)
         announced = file_of(done, form, label, labels)
-        expect_surface(done, allow_empty)
         is_by_labels = label is None and (done.get("parameters") or {}).get("labels") is not None
         beside = files_of_mesh(target, is_by_labels)[1:]
         with written(target) as file:
@@ -474,6 +474,7 @@ class Client(Batches):
     def _fetch(self, job: api.SucceededJob, notes: Sequence[api.Note]) -> Mesh:
         data = bytearray()
         self._exchange.download(file_of(job, "ply"), lambda at, piece: _put(data, at, piece))
+        notes = [*notes, *job["mesh"].get("notes", [])]
         return Mesh(**ply.parse(data), job=job, notes=notes, download=self.download)
 
 

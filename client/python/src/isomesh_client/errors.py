@@ -29,7 +29,8 @@ class WrongAnswer(IsomeshError):
 
 
 class VolumeWarning(UserWarning):
-    """A note about a volume: something that the server decided or corrected when it read the file."""
+    """A note about a volume, which the server decided or corrected when it read the file, or about a mesh, such as walls
+    that are too thin."""
 
 
 def warn_of_notes(notes: Sequence[api.Note], name: str) -> None:

@@ -30,7 +30,8 @@ class Mesh:
     bounds    float32, shape (2, 3): the smallest and the largest corner
     space     "lps" (DICOM's patient space), or "ras" (NIfTI's and nibabel's); see `in_space`
     job       the job that made the mesh, with everything that the server measured
-    notes     what the server decided or corrected when it read the volume, as {"code", "detail"}
+    notes     what the server decided or corrected when it read the volume, and then what it found in the mesh,
+              as {"code", "detail"}
 
     The arrays belong to you: change them or assign others, as in `mesh.vertices += 1`. `job` and
     `notes` then still describe the mesh that the server made.

@@ -216,7 +216,7 @@ export class Client {
   }
 
   /** Lists the areas where two labels of a finished job touch, or one is next to the background, whose `b` is null. With `edgeContacts` also those of pairs that share no face of a voxel. */
-  wallsOfJob(id: string, signal?: GlobalAbortSignal, edgeContacts = false): Promise<WallSummary[]> {
+  wallsOfJob(id: string, signal?: GlobalAbortSignal, { edgeContacts = false }: { edgeContacts?: boolean } = {}): Promise<WallSummary[]> {
     const query = { edge_contacts: edgeContacts ? 'true' : undefined };
     return allPages((cursor) => this.connection.json<WallList>(`${jobPath(id)}/walls${queryOf({ cursor, ...query })}`, { signal }), ({ walls }) => walls);
   }
@@ -237,10 +237,10 @@ export class Client {
    * an ApiError with the status 422 if the surface is empty, unless `allowEmpty` is true.
    */
   async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal, { allowEmpty = false }: { allowEmpty?: boolean } = {}): Promise<ArrayBuffer> {
+    if (job.mesh?.empty && !allowEmpty) throw emptySurface(job.mesh);
     const { files = {}, labels = [] } = job.mesh ?? {};
     const file = files[format] ?? (labels.length === 1 ? labels[0]?.files[format] : undefined);
     if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
-    if (job.mesh?.empty && !allowEmpty) throw emptySurface(job.mesh);
     return this.connection.bytes(file.href, { signal });
   }
 

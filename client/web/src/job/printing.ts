@@ -56,7 +56,7 @@ export function isForPrinter({ formats, certify }: JobParameters): boolean {
   return certify === true && printers.every((format) => formats.some((one) => one === format));
 }
 
-// True if it came out closed, too.
+// True if it came out with an inside, too.
 export function isForPrinting({ parameters, mesh }: Job): boolean {
-  return isForPrinter(parameters) && (mesh?.quality.closed ?? false);
+  return isForPrinter(parameters) && (mesh?.quality.encloses_volume ?? false);
 }

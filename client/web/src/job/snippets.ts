@@ -106,6 +106,7 @@ export function librarySnippet(origin: string, job: JobParameters, hasToken: boo
     `const auto parameters = isomesh::parse_job_parameters(R"(`,
     `  ${JSON.stringify(jobRequest(job))})");`,
     'const isomesh::Job job = client.wait(client.submit(parameters).id);',
+    'if (job.mesh && job.mesh->empty) throw std::runtime_error(job.mesh->empty_reason.value_or("the surface is empty"));',
     ...fetched,
   ].join('\n');
 }

@@ -48,7 +48,7 @@ export function wallTable(scope: Scope, { id, mesh }: Job, search: LabelSearch<L
   search.input.addEventListener('input', () => details.open && fill());
   details.addEventListener('toggle', () => {
     if (all.length > 0) return fill();
-    client.wallsOfJob(id, scope.signal, true).then(
+    client.wallsOfJob(id, scope.signal, { edgeContacts: true }).then(
       (walls) => {
         all = walls.sort((a, b) => b.area_mm2 - a.area_mm2);
         fill();
