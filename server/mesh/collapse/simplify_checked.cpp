@@ -265,8 +265,17 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
   Checker checker(options, quiet, mesh, original);
   SimplifyOptions asked = options;
   std::optional<Proposal> first;  // as it was proposed, where only the number counts
+  const auto find_places = [&](Proposal& proposal) {
+    if (options.keeps_volume) {
+      proposal.places = collapse::places_with_volume(mesh, surface.sides, proposal.history,
+                                                     options.max_error_mm, quiet);
+    } else {
+      proposal.places.assign(mesh.positions.begin(), mesh.positions.end());
+    }
+  };
   const auto as_proposed = [&](Proposal proposal) {
-    checker.move_back(proposal);
+    find_places(proposal);
+    if (options.keeps_volume) checker.move_back(proposal);
     return proposal;
   };
   for (int attempt = 1;; ++attempt) {
@@ -274,10 +283,9 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
     Proposal proposal = propose(asked, part, mesh, walls, original);
     SimplificationEffect& effect = proposal.effect;
     const bool was_reached = effect.reached_triangles;
-    proposal.places = collapse::places_with_volume(mesh, surface.sides, proposal.history,
-                                                   options.max_error_mm, quiet);
     if (!grids && !was_reached) return as_proposed(std::move(first ? *first : proposal));
-    if (!grids && !first) first = proposal;
+    if (!grids && !first && options.triangles > 0) first = proposal;
+    find_places(proposal);
     effect.is_within = checker.repair(proposal);
     effect.triangles_after = proposal.triangles.size();
     if (options.triangles == 0) return proposal;
