@@ -174,6 +174,20 @@ TEST(KeptVolume, IsNotMadeUpForWhereVerticesAreToStay) {
   }
 }
 
+TEST(KeptVolume, TurnsNoTriangleIntoANeedleWithoutArea) {
+  Mesh mesh;
+  mesh.positions.resize_for_overwrite(3);
+  std::ranges::copy(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, mesh.positions.begin());
+  const auto is_turned_at = [&](const Vec3& place) {
+    return collapse::is_turned(mesh, std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, place}, {0, 1, 2});
+  };
+  EXPECT_FALSE(is_turned_at({0, 1, 0}));
+  EXPECT_FALSE(is_turned_at({0.3F, 0.01F, 0}));
+  EXPECT_TRUE(is_turned_at({0.3F, 0, 0}));
+  EXPECT_TRUE(is_turned_at({0.3F, 1e-20F, 0}));
+  EXPECT_TRUE(is_turned_at({0.3F, -0.5F, 0}));
+}
+
 // Flat surfaces lose no volume, so nothing there moves.
 TEST(KeptVolume, MovesNothingOfABox) {
   auto volume = test::constant<std::uint8_t>(0, {20, 20, 20});
