@@ -215,12 +215,15 @@ class Checker {
     std::erase_if(fresh_, [&](std::uint32_t t) { return !is_left(corners_[t]); });
     if (grids_ == nullptr) return are_any_moved;
     const MarkedCubes near_changed(changed, within_mm_);
+    std::vector<std::uint8_t> is_doubtful(corners_.size());
+    for_each(context_, corners_.size(), [&](std::size_t t) {
+      const Box box = box_of(original_.view, original_.view.triangles[t]);
+      is_doubtful[t] = near_changed.are_near(box) ? 1 : 0;
+    });
+    for (const std::uint32_t t : lost_) is_doubtful[t] = 1;
     doubtful_.clear();
     for (std::uint32_t t = 0; t < corners_.size(); ++t) {
-      const Box box = box_of(original_.view, original_.view.triangles[t]);
-      if (near_changed.are_near(box) || std::ranges::binary_search(lost_, t)) {
-        doubtful_.push_back(t);
-      }
+      if (is_doubtful[t] != 0) doubtful_.push_back(t);
     }
     return are_any_moved;
   }
