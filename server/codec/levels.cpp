@@ -26,9 +26,10 @@ void coarsen_in_steps(std::uint64_t triangles, const mesh::Context& context, con
     is_last = nearer <= triangles;
     // Each step has a fraction of the previous step's work.
     const double end = is_last ? 1 : begin + (1 - begin) * (1 - 1.0 / kMostAtOnce);
-    const mesh::SimplificationEffect effect =
-        simplify({.triangles = std::max({triangles, nearer, std::uint64_t{1}})},
-                 context.part(begin, end), surface);
+    // All levels have the places of the finest one, whose grid they are rounded to.
+    const mesh::SimplificationEffect effect = simplify(
+        {.triangles = std::max({triangles, nearer, std::uint64_t{1}}), .keeps_volume = false},
+        context.part(begin, end), surface);
     if (effect.triangles_after == effect.triangles_before) return;
     begin = end;
   }

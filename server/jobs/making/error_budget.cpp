@@ -27,6 +27,14 @@ double rounding_mm(const codec::Grid& grid) {
   return 4 * largest * std::numeric_limits<float>::epsilon();
 }
 
+// The grid of the mesh after its vertices were moved.
+codec::Grid grid_of(const mesh::Mesh& mesh, int bits, double moved_mm) {
+  codec::Grid grid = codec::grid_of(mesh, bits);
+  for (auto& low : grid.low) low -= static_cast<float>(moved_mm);
+  grid.side += static_cast<float>(2 * moved_mm);
+  return grid;
+}
+
 double quantisation_of(const codec::Grid& grid) {
   const double step = grid.side / (std::pow(2.0, grid.bits) - 1);
   return std::sqrt(3.0) / 2 * step + rounding_mm(grid);
@@ -76,7 +84,8 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
   if (!parameters.max_error_mm || !has_rounded_files(parameters)) return result;
   int& bits = result.draco.position_bits;
   const double most = kQuantisationShare * *parameters.max_error_mm;
-  codec::Grid grid = codec::grid_of(mesh, bits);
+  // Simplification may move vertices so far.
+  codec::Grid grid = grid_of(mesh, bits, *parameters.max_error_mm);
   for (; quantisation_of(grid) > most; grid.bits = bits) {
     if (bits == kMostBits) {
       throw invalid_parameter(
@@ -91,10 +100,7 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
 
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh, double moved_mm) {
   if (!has_rounded_files(parameters) || mesh.positions.size() == 0) return 0;
-  codec::Grid grid = codec::grid_of(mesh, parameters.draco.position_bits);
-  for (auto& low : grid.low) low -= static_cast<float>(moved_mm);
-  grid.side += static_cast<float>(2 * moved_mm);
-  return quantisation_of(grid);
+  return quantisation_of(grid_of(mesh, parameters.draco.position_bits, moved_mm));
 }
 
 std::vector<MeshFormat> measured_formats(const MeshParameters& parameters) {

@@ -25,7 +25,8 @@ MeshCertificate::Reference error_reference(const MeshParameters& parameters);
 double most_displacement(const MeshParameters& parameters);
 
 // The parameters with enough bits for Draco's coordinates to keep the error, and at least those of
-// the request. Throws Error kInvalidParameter, field "max_error_mm", if Draco has too few.
+// the request. They suffice after the mesh was simplified, too. Throws Error kInvalidParameter,
+// field "max_error_mm", if Draco has too few.
 MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh& mesh);
 
 // The most that rounding to the files' coordinates moves a point of the mesh, in millimetres: half

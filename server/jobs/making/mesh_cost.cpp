@@ -100,7 +100,7 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface, std::uint64_t overla
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                           const MeshParameters& parameters, const Measures& measures) {
   // From simplify.h, bound.h and triangle_grid.h, and a little more.
-  constexpr std::uint64_t kSimplifyBytesPerTriangle = 220;
+  constexpr std::uint64_t kSimplifyBytesPerTriangle = 280;
   constexpr std::uint64_t kProveBytesPerTriangle = 260;
   constexpr std::uint64_t kGridsPerTriangle = 130;
   std::uint64_t simplifying = 0;
@@ -109,11 +109,13 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
   }
   if (parameters.max_error_mm && !parameters.labels) {
     const std::uint64_t planes = planes_of(surface, parameters);
-    simplifying =
+    const std::uint64_t proving =
         surface.triangles * kProveBytesPerTriangle +
         mesh::proving_memory({.scheme = scheme_of(parameters.scheme), .close = parameters.close},
                              planes, samples / planes) +
         writing_bytes(samples, surface, parameters);
+    // A surface that the field proves nothing about is simplified as without it.
+    simplifying = std::max(simplifying, proving);
   }
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
   // While files are encoded, and while thickness is measured.

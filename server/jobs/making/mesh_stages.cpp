@@ -76,7 +76,7 @@ void simplify_checked(const MeshParameters& parameters, const KeptSurface& extra
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
     const double most = *parameters.max_error_mm;
-    options.max_error_mm = most - quantisation_mm(parameters, mesh);
+    options.max_error_mm = most - quantisation_mm(parameters, mesh, most);
     if (error_reference(parameters) == MeshCertificate::Reference::kExtracted) {
       options.before = extracted.positions;
     }

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <numeric>
 
+#include "server/mesh/collapse/swept.h"
+#include "server/mesh/measure/extent-inl.h"
 #include "server/mesh/measure/point_triangle.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
@@ -16,8 +19,7 @@ namespace {
 
 constexpr std::uint32_t kNone = ~std::uint32_t{0};
 // Curves move first, because the walls between them make up for what is left.
-constexpr std::array kMovesCurves = {true,  false, true,  false, true,
-                                     false, false, false, false, false};
+constexpr std::array kMovesCurves = {true, false, true, false, true, false, false};
 constexpr double kMostOfEdge = 0.5;
 constexpr double kMostOfBound = 0.95;
 // The least area by which a lost volume is divided, as a share of the triangles' areas: normals of
@@ -32,31 +34,13 @@ constexpr double kDepthOfCap = 1e-3;  // as a share of an edge
 constexpr std::size_t kMostCaps = 64;
 constexpr int kMostPulls = 8;  // of vertices whose triangles turn; the last one goes all the way
 
-Point scaled(const Point& p, double factor) {
-  return {p[0] * factor, p[1] * factor, p[2] * factor};
-}
-
-double length(const Point& p) { return std::sqrt(dot(p, p)); }
-
-Point third_of_area(const Corners& corners) {
-  return scaled(normal_of(corners[0], corners[1], corners[2]), 1.0 / 6);
-}
-
-Vec3 rounded(const Point& p) {
-  return {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
-}
-
-// The volume that a triangle sweeps on a straight way of its corners, in front of it. It is divided
-// among the corners by their ways; the sum over a closed surface is the exact change of its volume.
-// The integrand is quadratic, so Simpson's rule is exact.
-std::array<double, 3> swept(const Corners& from, const Corners& to) {
-  Corners middle;
-  for (std::size_t i = 0; i < 3; ++i) middle[i] = scaled(plus(from[i], to[i]), 0.5);
-  const Point ends = plus(normal_of(from[0], from[1], from[2]), normal_of(to[0], to[1], to[2]));
-  const Point inner = normal_of(middle[0], middle[1], middle[2]);
-  const Point area = scaled(plus(ends, scaled(inner, 4)), 1.0 / 36);
-  return {dot(minus(to[0], from[0]), area), dot(minus(to[1], from[1]), area),
-          dot(minus(to[2], from[2]), area)};
+// True if moved corners turn a triangle too far, or leave it no area.
+bool turns(const Corners& before, const Corners& after) {
+  const Point old = normal_of(before[0], before[1], before[2]);
+  const Point normal = normal_of(after[0], after[1], after[2]);
+  const double lengths = std::sqrt(dot(old, old) * dot(normal, normal));
+  if (!(lengths > 0 && dot(old, normal) >= kLeastCosineOfMoves * lengths)) return true;
+  return has_no_area(rounded(after[0]), rounded(after[1]), rounded(after[2]));
 }
 
 class Mover {
@@ -74,6 +58,7 @@ class Mover {
   }
 
   std::vector<Vec3> run() {
+    of_triangles_.resize(triangles_.size());
     for (const bool moves_curves : kMovesCurves) {
       context_.throw_if_stopped();
       measure();
@@ -106,14 +91,25 @@ class Mover {
     std::array<std::uint32_t, 3> slots;
   };
 
+  static void make_set(std::vector<WallSides>& walls) {
+    std::ranges::sort(walls);
+    walls.erase(std::unique(walls.begin(), walls.end()), walls.end());
+  }
+
   void find_walls(std::span<const WallSides> sides) {
-    walls_.assign(sides.begin(), sides.end());
-    std::ranges::sort(walls_);
-    walls_.erase(std::unique(walls_.begin(), walls_.end()), walls_.end());
+    // Neighbours are of one wall as a rule, so few are sorted.
+    std::vector<std::vector<WallSides>> found(chunks_of(sides.size()));
+    for_chunks(context_, sides.size(), [&](std::size_t begin, std::size_t end) {
+      std::vector<WallSides>& walls = found[begin / kChunk];
+      std::ranges::unique_copy(sides.subspan(begin, end - begin), std::back_inserter(walls));
+      make_set(walls);
+    });
+    for (const auto& walls : found) walls_.insert(walls_.end(), walls.begin(), walls.end());
+    make_set(walls_);
     wall_of_.resize(sides.size());
     for_each(context_, sides.size(), [&](std::size_t t) {
-      const auto found = std::ranges::lower_bound(walls_, sides[t]);
-      wall_of_[t] = static_cast<std::uint32_t>(found - walls_.begin());
+      const auto wall = std::ranges::lower_bound(walls_, sides[t]);
+      wall_of_[t] = static_cast<std::uint32_t>(wall - walls_.begin());
     });
     if (walls_.empty()) walls_.emplace_back();
     lost_.assign(walls_.size(), 0);
@@ -129,15 +125,22 @@ class Mover {
     for_each(context_, count,
              [&](std::size_t v) { kept_[v] = history.kept(static_cast<std::uint32_t>(v)); });
     number_.assign(count, kNone);
+    const auto corners_left = [&](const Triangle& triangle) {
+      return Triangle{kept_[triangle[0]], kept_[triangle[1]], kept_[triangle[2]]};
+    };
+    const auto is_left = [](const Triangle& corners) {
+      return corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0];
+    };
+    const auto triangles = std::ranges::count_if(
+        mesh_.triangles, [&](const Triangle& each) { return is_left(corners_left(each)); });
+    triangles_.reserve(static_cast<std::size_t>(triangles));
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-      const auto& [a, b, c] = mesh_.triangles[t];
-      const Triangle corners = {kept_[a], kept_[b], kept_[c]};
-      if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
-        continue;
-      }
+      const Triangle corners = corners_left(mesh_.triangles[t]);
+      if (!is_left(corners)) continue;
       for (const std::uint32_t v : corners) number_[v] = 0;
       triangles_.push_back({corners, {wall_of(t), 0, 0}});
     }
+    left_.reserve(count - static_cast<std::size_t>(std::ranges::count(number_, kNone)));
     for (std::uint32_t v = 0; v < count; ++v) {
       if (number_[v] == kNone) continue;
       number_[v] = static_cast<std::uint32_t>(left_.size());
@@ -167,6 +170,8 @@ class Mover {
         ++counts[n];
       }
     }
+    first_slot_.reserve(left_.size() + 1);
+    slots_.reserve(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
     for (std::size_t n = 0; n < left_.size(); ++n) {
       first_slot_.push_back(static_cast<std::uint32_t>(slots_.size()));
       for (std::size_t k = 0; k < counts[n]; ++k) slots_.push_back({.wall = walls[begins[n] + k]});
@@ -198,10 +203,12 @@ class Mover {
   // them does not move across it. Junction curves whose walls are not known stay.
   void find_fixed() {
     const bool holds_curves = wall_of_.empty();
+    is_fixed_.reserve(left_.size());
     for (const std::uint32_t v : left_) {
       const bool is_held = mesh_.is_on_border(v) || (holds_curves && mesh_.is_on_line(v));
       is_fixed_.push_back(is_held ? 1 : 0);
     }
+    if (!mesh_.on_border.empty()) return;  // Closed surfaces have no ends.
     std::vector<std::uint64_t> edges;
     edges.reserve(3 * triangles_.size());
     for (const LeftTriangle& triangle : triangles_) {
@@ -273,7 +280,7 @@ class Mover {
     }
   }
 
-  // What collapses have swept.
+  // The volume that collapses have swept.
   void find_owed() {
     std::vector<std::array<float, 3>> swept_by(mesh_.triangles.size());
     for_each(context_, swept_by.size(), [&](std::size_t t) {
@@ -308,10 +315,12 @@ class Mover {
       slot.area = {0, 0, 0};
       slot.whole = 0;
     }
-    for (const LeftTriangle& triangle : triangles_) {
-      const Point area = third_of_area(places(triangle));
+    for_each(context_, triangles_.size(),
+             [&](std::size_t t) { of_triangles_[t] = third_of_area(places(triangles_[t])); });
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      const Point& area = of_triangles_[t];
       const double whole = length(area);
-      for (const std::uint32_t slot : triangle.slots) {
+      for (const std::uint32_t slot : triangles_[t].slots) {
         slots_[slot].area = plus(slots_[slot].area, area);
         slots_[slot].whole += whole;
       }
@@ -329,8 +338,9 @@ class Mover {
       const Slot& slot = slots_[first_slot_[n]];
       areas[slot.wall] += slot.whole;
     });
-    for (const LeftTriangle& triangle : triangles_) {
-      const double area = length(third_of_area(places(triangle)));
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      const LeftTriangle& triangle = triangles_[t];
+      const double area = length(of_triangles_[t]);  // as measured
       double owed = 0;
       std::size_t free = 0;
       for (std::size_t i = 0; i < 3; ++i) {
@@ -366,20 +376,23 @@ class Mover {
 
   // Moves the vertices of curves, or the others.
   void move(bool moves_curves) {
-    std::vector<Point> before = way_;
-    for (std::size_t n = 0; n < left_.size(); ++n) {
-      if (is_fixed_[n] != 0 || is_on_curve(n) != moves_curves) continue;
+    const std::vector<Point> before = way_;
+    for_each(context_, left_.size(), [&](std::size_t n) {
+      if (is_fixed_[n] != 0 || is_on_curve(n) != moves_curves) return;
       const Point step = moves_curves ? least_squares(slots_at(n)) : along_normal(slots_at(n)[0]);
       way_[n] = limited(n, plus(way_[n], step));
-    }
-    for (const LeftTriangle& triangle : triangles_) {
+    });
+    for_each(context_, triangles_.size(), [&](std::size_t t) {
       Corners from;
       for (std::size_t i = 0; i < 3; ++i) {
-        const std::uint32_t n = triangle.corners[i];
+        const std::uint32_t n = triangles_[t].corners[i];
         from[i] = plus(to_point(mesh_.positions[left_[n]]), before[n]);
       }
-      const std::array<double, 3> volumes = swept(from, places(triangle));
-      for (std::size_t i = 0; i < 3; ++i) slots_[triangle.slots[i]].owed += volumes[i];
+      of_triangles_[t] = swept(from, places(triangles_[t]));
+    });
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      const auto& slots = triangles_[t].slots;
+      for (std::size_t i = 0; i < 3; ++i) slots_[slots[i]].owed += of_triangles_[t][i];
     }
   }
 
@@ -415,12 +428,15 @@ class Mover {
   // Takes vertices back where triangles turn.
   void straighten() {
     std::vector<std::uint8_t> is_pulled(left_.size());
+    std::vector<std::uint8_t> turned(triangles_.size());
     for (int pull = 1; pull <= kMostPulls; ++pull) {
       std::ranges::fill(is_pulled, 0);
       bool is_any = false;
-      for (const LeftTriangle& triangle : triangles_) {
-        if (!is_turned(triangle)) continue;
-        for (const std::uint32_t n : triangle.corners) is_pulled[n] = 1;
+      for_each(context_, triangles_.size(),
+               [&](std::size_t t) { turned[t] = is_turned(triangles_[t]) ? 1 : 0; });
+      for (std::size_t t = 0; t < triangles_.size(); ++t) {
+        if (turned[t] == 0) continue;
+        for (const std::uint32_t n : triangles_[t].corners) is_pulled[n] = 1;
         is_any = true;
       }
       if (!is_any) return;
@@ -441,15 +457,6 @@ class Mover {
     return is_moved && turns(before, places(triangle));
   }
 
- public:
-  static bool turns(const Corners& before, const Corners& after) {
-    const Point old = normal_of(before[0], before[1], before[2]);
-    const Point normal = normal_of(after[0], after[1], after[2]);
-    const double lengths = std::sqrt(dot(old, old) * dot(normal, normal));
-    return !(lengths > 0 && dot(old, normal) >= kLeastCosineOfMoves * lengths);
-  }
-
- private:
   const Mesh& mesh_;
   const Context& context_;
   const double most_mm_;
@@ -460,6 +467,8 @@ class Mover {
   std::vector<std::uint32_t> number_;   // of it among those that are left
   std::vector<std::uint32_t> left_;     // vertices of the mesh
   std::vector<LeftTriangle> triangles_;
+  // In each round, a third of the area with its normal, and then the volume swept by each corner.
+  std::vector<std::array<double, 3>> of_triangles_;
   std::vector<std::uint32_t> first_slot_;  // of each vertex that is left, and the end
   std::vector<Slot> slots_;
   std::vector<std::uint8_t> is_fixed_;
@@ -485,7 +494,7 @@ bool is_turned(const Mesh& mesh, std::span<const Vec3> places, const Triangle& c
     after[i] = to_point(places[corners[i]]);
     is_moved = is_moved || before[i] != after[i];
   }
-  return is_moved && Mover::turns(before, after);
+  return is_moved && turns(before, after);
 }
 
 }  // namespace isomesh::mesh::collapse

@@ -1,6 +1,6 @@
 // Moves the vertices of a simplified surface so that it keeps its volume; private to this folder.
 //
-// Where vertices are only removed, chords remain of what was round, and it becomes smaller. So each
+// A round surface whose vertices are only removed becomes smaller, because chords remain. So each
 // vertex moves along its normal by the volume that its surroundings lost. Vertices of junction
 // curves move by least squares over their walls. P. Lindstrom and G. Turk place the vertex of each
 // collapse in the plane that keeps the volume ("Fast and memory efficient polygonal
@@ -26,14 +26,14 @@ inline constexpr double kLeastCosineOfMoves = 0.5;
 // gone, on a cap, or at the end of an open surface and beside it, have their own, and those of
 // junction curves without `sides`. None moves across a cap. No other moves farther than
 // `most_mm`, nor than half the length of its shortest edge, and no triangle turns farther than
-// kLeastCosineOfMoves. `sides`: of the mesh's triangles, empty if all are of one wall. Each wall
-// keeps the volume on its sides, as far as these limits allow. The same for any number of threads.
-// Throws Error kCancelled.
+// kLeastCosineOfMoves or loses its area. `sides`: of the mesh's triangles, empty if all are of one
+// wall. Each wall keeps the volume on its sides, as far as these limits allow. The same for any
+// number of threads. Throws Error kCancelled.
 std::vector<Vec3> places_with_volume(const Mesh& mesh, std::span<const WallSides> sides,
                                      const History& history, double most_mm,
                                      const Context& context);
 
-// True if moved corners turn a triangle of the mesh's vertices too far.
+// True if moved corners turn a triangle of the mesh's vertices too far, or leave it no area.
 bool is_turned(const Mesh& mesh, std::span<const Vec3> places, const Triangle& corners);
 
 }  // namespace isomesh::mesh::collapse

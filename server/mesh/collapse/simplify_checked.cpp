@@ -215,12 +215,15 @@ class Checker {
     std::erase_if(fresh_, [&](std::uint32_t t) { return !is_left(corners_[t]); });
     if (grids_ == nullptr) return are_any_moved;
     const MarkedCubes near_changed(changed, within_mm_);
+    std::vector<std::uint8_t> is_doubtful(corners_.size());
+    for_each(context_, corners_.size(), [&](std::size_t t) {
+      const Box box = box_of(original_.view, original_.view.triangles[t]);
+      is_doubtful[t] = near_changed.are_near(box) ? 1 : 0;
+    });
+    for (const std::uint32_t t : lost_) is_doubtful[t] = 1;
     doubtful_.clear();
     for (std::uint32_t t = 0; t < corners_.size(); ++t) {
-      const Box box = box_of(original_.view, original_.view.triangles[t]);
-      if (near_changed.are_near(box) || std::ranges::binary_search(lost_, t)) {
-        doubtful_.push_back(t);
-      }
+      if (is_doubtful[t] != 0) doubtful_.push_back(t);
     }
     return are_any_moved;
   }
@@ -265,8 +268,17 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
   Checker checker(options, quiet, mesh, original);
   SimplifyOptions asked = options;
   std::optional<Proposal> first;  // as it was proposed, where only the number counts
+  const auto find_places = [&](Proposal& proposal) {
+    if (options.keeps_volume) {
+      proposal.places = collapse::places_with_volume(mesh, surface.sides, proposal.history,
+                                                     options.max_error_mm, quiet);
+    } else {
+      proposal.places.assign(mesh.positions.begin(), mesh.positions.end());
+    }
+  };
   const auto as_proposed = [&](Proposal proposal) {
-    checker.move_back(proposal);
+    find_places(proposal);
+    if (options.keeps_volume) checker.move_back(proposal);
     return proposal;
   };
   for (int attempt = 1;; ++attempt) {
@@ -274,10 +286,9 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
     Proposal proposal = propose(asked, part, mesh, walls, original);
     SimplificationEffect& effect = proposal.effect;
     const bool was_reached = effect.reached_triangles;
-    proposal.places = collapse::places_with_volume(mesh, surface.sides, proposal.history,
-                                                   options.max_error_mm, quiet);
     if (!grids && !was_reached) return as_proposed(std::move(first ? *first : proposal));
-    if (!grids && !first) first = proposal;
+    if (!grids && !first && options.triangles > 0) first = proposal;
+    find_places(proposal);
     effect.is_within = checker.repair(proposal);
     effect.triangles_after = proposal.triangles.size();
     if (options.triangles == 0) return proposal;

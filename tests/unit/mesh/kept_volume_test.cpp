@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -159,7 +160,35 @@ TEST(KeptVolume, LeavesEachWallWithinTheBoundBothWaysAndEachLabelClosed) {
   }
 }
 
-// A flat part loses no volume, so nothing there moves.
+TEST(KeptVolume, IsNotMadeUpForWhereVerticesAreToStay) {
+  const Case one = cases().back();
+  const SeparatingSurface before = smoothed(one);
+  const std::set<Vec3> places(before.mesh.positions.begin(), before.mesh.positions.end());
+  for (const double bound : {0.5, kUnbounded}) {
+    SeparatingSurface after = smoothed(one);
+    const std::uint64_t aim = bound < kUnbounded ? 0 : before.mesh.triangles.size() / 10;
+    simplify({.max_error_mm = bound, .triangles = aim, .keeps_volume = false}, {}, after);
+    EXPECT_LT(after.mesh.triangles.size(), before.mesh.triangles.size() / 3);
+    EXPECT_TRUE(std::ranges::all_of(after.mesh.positions,
+                                    [&](const Vec3& place) { return places.contains(place); }));
+  }
+}
+
+TEST(KeptVolume, TurnsNoTriangleIntoANeedleWithoutArea) {
+  Mesh mesh;
+  mesh.positions.resize_for_overwrite(3);
+  std::ranges::copy(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, mesh.positions.begin());
+  const auto is_turned_at = [&](const Vec3& place) {
+    return collapse::is_turned(mesh, std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, place}, {0, 1, 2});
+  };
+  EXPECT_FALSE(is_turned_at({0, 1, 0}));
+  EXPECT_FALSE(is_turned_at({0.3F, 0.01F, 0}));
+  EXPECT_TRUE(is_turned_at({0.3F, 0, 0}));
+  EXPECT_TRUE(is_turned_at({0.3F, 1e-20F, 0}));
+  EXPECT_TRUE(is_turned_at({0.3F, -0.5F, 0}));
+}
+
+// Flat surfaces lose no volume, so nothing there moves.
 TEST(KeptVolume, MovesNothingOfABox) {
   auto volume = test::constant<std::uint8_t>(0, {20, 20, 20});
   for (std::uint32_t k = 5; k < 15; ++k) {
