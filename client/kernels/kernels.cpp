@@ -314,14 +314,13 @@ class Run {
 // samples are to be put into that order, too. A geometry with a fault, which isomesh_start tells,
 // stays as it is.
 ISOMESH_EXPORT void isomesh_order(isomesh_volume* volume, std::int32_t (*axes)[3]) {
-  const auto dims = array_of(volume->dims);
+  auto dims = array_of(volume->dims);
   Geometry geometry = geometry_of(*volume);
   volume::AxisOrder order = volume::kFilesOrder;
   if (!volume::find_fault(dims, geometry)) {
     geometry = volume::normalised(geometry);
-    order = volume::canonical_order(geometry);
-    geometry = volume::canonical_geometry(dims, geometry);
-    std::ranges::copy(volume::in_order(dims, order), volume->dims);
+    order = volume::make_canonical(dims, geometry);
+    std::ranges::copy(dims, volume->dims);
     std::ranges::copy(geometry.origin, volume->origin);
     std::ranges::copy(geometry.spacing, volume->spacing);
     std::ranges::copy(geometry.direction, volume->direction);

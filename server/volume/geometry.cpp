@@ -183,6 +183,12 @@ double settled_cosine(double cosine) {
   return rounded(cosine, 10);
 }
 
+std::array<double, 9> settled_direction(const Geometry& geometry) {
+  std::array<double, 9> settled = {};
+  std::ranges::transform(geometry.direction, settled.begin(), settled_cosine);
+  return settled;
+}
+
 // Rounds a place to numbers as people choose them, if single precision may be all that is between.
 class PlaceGrid {
  public:
@@ -319,7 +325,7 @@ Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& ge
 }
 
 AxisOrder canonical_order(const Geometry& geometry) {
-  std::vector<Candidate> candidates = right_handed_orders(geometry.direction);
+  std::vector<Candidate> candidates = right_handed_orders(settled_direction(geometry));
   keep_largest(candidates, [](const Candidate& each) {
     return each.direction[0] + each.direction[4] + each.direction[8];
   });
@@ -327,6 +333,16 @@ AxisOrder canonical_order(const Geometry& geometry) {
     keep_largest(candidates, [&](const Candidate& each) { return each.direction[at]; });
   }
   return candidates.front().order;
+}
+
+AxisOrder along_patient(const AxisOrder& change, const Geometry& geometry) {
+  const AxisOrder order = canonical_order(geometry);
+  AxisOrder back = {};
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    const int axis = static_cast<int>(place) + 1;
+    back[axis_at(order, place)] = order[place] < 0 ? -axis : axis;
+  }
+  return in_turn(in_turn(back, change), order);
 }
 
 std::string axis_codes(const Geometry& geometry) {
@@ -361,7 +377,7 @@ Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geom
   const Vector3 before = way_to_middle(dims, geometry);
   Geometry settled = geometry;
   std::ranges::transform(geometry.spacing, settled.spacing.begin(), settled_spacing);
-  std::ranges::transform(geometry.direction, settled.direction.begin(), settled_cosine);
+  settled.direction = settled_direction(geometry);
   const AxisOrder order = canonical_order(geometry);
   Geometry result = in_order(dims, settled, order);
   const Vector3 after = way_to_middle(in_order(dims, order), result);
@@ -372,6 +388,13 @@ Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geom
                        largest_coordinate(in_order(dims, order), result));
   for (double& place : result.origin) place = grid.nearest(place);
   return normalised(result);
+}
+
+AxisOrder make_canonical(std::array<std::uint32_t, 3>& dims, Geometry& geometry) {
+  const AxisOrder order = canonical_order(geometry);
+  geometry = canonical_geometry(dims, geometry);
+  dims = in_order(dims, order);
+  return order;
 }
 
 std::optional<FieldError> find_fault(const std::array<std::uint32_t, 3>& dims,

@@ -54,7 +54,12 @@ Geometry reoriented(const std::array<std::uint32_t, 3>& dims, const Geometry& ge
 // the largest sum of the cosines between i and L, j and P, k and S. Among sums within 1e-4 of it,
 // the direction matrix decides that is lexicographically greatest, row by row; numbers within 1e-4
 // are equal. So it depends on the lattice alone, and not on the order in which a file has its axes.
+// Cosines are rounded first, as canonical_geometry rounds them: its result is in this order.
 AxisOrder canonical_order(const Geometry& geometry);
+
+// The change of a lattice's directions as `reoriented` takes it, but of the axes of the canonical
+// order. `change` is one of the axes of `geometry`, which may have another order.
+AxisOrder along_patient(const AxisOrder& change, const Geometry& geometry);
 
 // Three letters for the directions in which i, j and k increase, as nibabel's axis codes: "LPS" for
 // axes in the canonical order, "RAS" for the usual NIfTI file.
@@ -78,9 +83,12 @@ Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geom
 // So a number as people choose it is the same after single precision, and any number after double
 // precision. Rounding moves a sample by at most about 3e-5 of the smallest spacing and 2^-23 of the
 // largest coordinate together, which is the precision of a mesh. The result of the result is
-// itself. The geometry must be normalised and free of
-// faults (find_fault).
+// itself. The geometry must be normalised and free of faults (find_fault).
 Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry);
+
+// Makes sizes and geometry canonical. Returns the order into which the samples must be put, too
+// (sample_order.h). The geometry must be as for canonical_geometry.
+AxisOrder make_canonical(std::array<std::uint32_t, 3>& dims, Geometry& geometry);
 
 // The first reason why a geometry is unusable, or empty. Reasons are: numbers that are not finite;
 // spacings that are not positive; direction columns that are not unit vectors (to 1e-3) or nearly

@@ -7,6 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
+#include "server/volume/unusable.h"
+
 namespace isomesh::volume {
 namespace {
 
@@ -23,6 +26,10 @@ struct Side {
   std::size_t place(std::size_t at) const { return is_reversed ? size - 1 - at : at; }
 };
 
+void check(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
+}
+
 template <class Sample>
 void copy_reversed(const Sample* from, std::size_t count, Sample* to) {
   for (std::size_t at = 0; at < count; ++at) to[at] = from[count - 1 - at];
@@ -30,7 +37,8 @@ void copy_reversed(const Sample* from, std::size_t count, Sample* to) {
 
 // Exchanges the axes of a matrix whose elements are `unit` samples, in place.
 template <class Sample>
-void exchange_in_place(Sample* samples, std::size_t unit, const Side& fast, const Side& slow) {
+void exchange_in_place(Sample* samples, std::size_t unit, const Side& fast, const Side& slow,
+                       const std::stop_token& stop) {
   const auto source_of = [&](std::size_t place) {
     return fast.place(place / slow.size) + slow.place(place % slow.size) * fast.size;
   };
@@ -41,6 +49,7 @@ void exchange_in_place(Sample* samples, std::size_t unit, const Side& fast, cons
     std::copy_n(samples + start * unit, unit, first.begin());
     std::size_t place = start;
     for (;;) {
+      check(stop);
       is_done[place] = true;
       const std::size_t source = source_of(place);
       if (source == start) break;
@@ -144,8 +153,8 @@ template <class Sample>
 class Turn {
  public:
   Turn(std::span<std::byte> samples, const std::array<std::uint32_t, 3>& dims,
-       const AxisOrder& order)
-      : samples_(reinterpret_cast<Sample*>(samples.data())) {
+       const AxisOrder& order, const std::stop_token& stop)
+      : samples_(reinterpret_cast<Sample*>(samples.data())), stop_(stop) {
     for (std::size_t axis = 0; axis < axes_.size(); ++axis) axes_[axis] = {axis, dims[axis], false};
     for (const int axis : order) {
       axes_[static_cast<std::size_t>(std::abs(axis) - 1)].is_reversed = axis < 0;
@@ -169,19 +178,20 @@ class Turn {
     const bool is_small = slice * sizeof(Sample) <= kMostSliceBytes;
     std::vector<Sample> copy(is_small ? slice : 0);
     for (std::size_t at = 0; at < axes_[2].size; ++at) {
+      check(stop_);
       Sample* const samples = samples_ + at * slice;
       if (is_small) {
         exchange(samples, axes_[0], axes_[1], copy.data());
         std::ranges::copy(copy, samples);
       } else {
-        exchange_in_place(samples, 1, axes_[0], axes_[1]);
+        exchange_in_place(samples, 1, axes_[0], axes_[1], stop_);
       }
     }
     exchanged(axes_[0], axes_[1]);
   }
 
   void exchange_rows() {
-    exchange_in_place(samples_, axes_[0].size, axes_[1], axes_[2]);
+    exchange_in_place(samples_, axes_[0].size, axes_[1], axes_[2], stop_);
     exchanged(axes_[1], axes_[2]);
   }
 
@@ -196,6 +206,7 @@ class Turn {
     if (!x.is_reversed && !y.is_reversed && !z.is_reversed) return;
     std::vector<Sample> copy(x.size);
     for (std::size_t k = 0; k < z.size; ++k) {
+      check(stop_);
       for (std::size_t j = 0; j < y.size; ++j) {
         const std::size_t one = k * y.size + j;
         const std::size_t other = z.place(k) * y.size + y.place(j);
@@ -218,19 +229,32 @@ class Turn {
   }
 
   Sample* samples_;
+  std::stop_token stop_;
   std::array<Side, 3> axes_;
 };
 
 }  // namespace
 
 void put_in_order(std::span<std::byte> samples, std::size_t bytes_per_sample,
-                  const std::array<std::uint32_t, 3>& dims, const AxisOrder& order) {
+                  const std::array<std::uint32_t, 3>& dims, const AxisOrder& order,
+                  const std::stop_token& stop) {
   if (order == kFilesOrder) return;
-  const auto run = [&](auto sample) { Turn<decltype(sample)>(samples, dims, order).run(order); };
+  const auto run = [&](auto sample) {
+    Turn<decltype(sample)>(samples, dims, order, stop).run(order);
+  };
   if (bytes_per_sample == 1) run(std::uint8_t{});
   if (bytes_per_sample == 2) run(std::uint16_t{});
   if (bytes_per_sample == 4) run(std::uint32_t{});
   if (bytes_per_sample == 8) run(std::uint64_t{});
+}
+
+void make_canonical(std::span<std::byte> samples, Volume& volume, const std::stop_token& stop) {
+  const std::array<std::uint32_t, 3> dims = volume.dims;
+  const AxisOrder order = make_canonical(volume.dims, volume.geometry);
+  if (const auto fault = find_fault(volume.dims, volume.geometry)) {
+    throw_unusable("The geometry of the volume cannot be used: " + fault->message + ".");
+  }
+  put_in_order(samples, bytes_per_sample(volume.type), dims, order, stop);
 }
 
 }  // namespace isomesh::volume

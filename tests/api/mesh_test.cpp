@@ -197,8 +197,7 @@ TEST_F(MeshTest, ARangeOfAnotherVersionIsTheWholeFile) {
   EXPECT_EQ(get({{"Range", "bytes=0-9"}, {"If-Range", "\"other\""}}).status, 200);
 }
 
-// --- In one request
-// ----------------------------------------------------------------------------------
+// --- In one request ------------------------------------------------------------------------------
 
 class MeshInOne : public testing::Test {
  protected:
@@ -263,8 +262,7 @@ TEST_F(MeshInOne, RefusesWhatIsNoVolume) {
   EXPECT_TRUE(daemon_.client().jobs().jobs.empty());
 }
 
-// --- Without a surface
-// ----------------------------------------------------------------------------------
+// --- Without a surface ---------------------------------------------------------------------------
 
 constexpr std::size_t kEmptyStlBytes = 84;
 

@@ -33,7 +33,7 @@ struct SegmentationObject {
   std::array<double, 3> origin = {0, 0, 0};         // LPS, in mm
   std::array<std::array<double, 3>, 3> steps = {};  // along columns, rows, slices
   std::vector<SegmentationSegment> segments;
-  std::vector<SegmentationFrame> frames;  // by segment, then by slice
+  std::vector<SegmentationFrame> frames;  // in any order
 };
 
 // Memory of the functional groups: some hundred bytes for each frame.

@@ -38,9 +38,14 @@ Place place_of(const Geometry& geometry, const std::array<double, 3>& index) {
   return place;
 }
 
-// A window of slices is read at once: slices across the layers of the file have samples all over
-// it.
-constexpr std::size_t kWindowBytes = std::size_t{64} << 20;
+// The slices that are read at once. Those across the layers of the file have samples all over it,
+// so a window of them is.
+std::uint32_t window_slices(const LabelGrid& grid) {
+  if (grid.axes[2] == 2) return 1;
+  const std::size_t slice = bytes_per_sample(grid.type) * grid.dims[0] * grid.dims[1];
+  return static_cast<std::uint32_t>(
+      std::clamp<std::size_t>(grid.window_bytes / slice, 1, grid.dims[2]));
+}
 
 // Reads slices of the label volume as the images have them.
 class SliceReader {
@@ -75,11 +80,9 @@ class SliceReader {
   };
 
   void read_window(std::uint32_t slice) {
-    const bool are_layers = grid_.axes[2] == 2;
-    const std::size_t count =
-        are_layers ? 1 : std::clamp<std::size_t>(kWindowBytes / slice_bytes_, 1, grid_.dims[2]);
-    begin_ = slice;
-    end_ = static_cast<std::uint32_t>(std::min<std::size_t>(slice + count, grid_.dims[2]));
+    const std::uint32_t count = window_slices(grid_);
+    begin_ = slice / count * count;
+    end_ = begin_ + std::min(count, grid_.dims[2] - begin_);
     window_.resize((end_ - begin_) * slice_bytes_);
     std::array<Range, 3> ranges = {Range{0, stored_dims_[0]}, Range{0, stored_dims_[1]},
                                    Range{0, stored_dims_[2]}};
@@ -266,6 +269,10 @@ std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
     for (const std::uint32_t slice : slices[place]) {
       frames.push_back({.segment = static_cast<std::uint16_t>(place + 1), .slice = slice});
     }
+  }
+  // Otherwise each segment would read all windows again, each of which may read the whole file.
+  if (const std::uint32_t window = window_slices(grid); window > 1) {
+    std::ranges::stable_sort(frames, {}, [&](const auto& frame) { return frame.slice / window; });
   }
   return frames;
 }

@@ -25,6 +25,7 @@ struct LabelGrid {
   std::array<bool, 3> is_flipped = {};          // along each axis of the images
   std::array<double, 3> origin = {0, 0, 0};     // of the images
   std::array<std::array<double, 3>, 3> steps = {};
+  std::size_t window_bytes = std::size_t{64} << 20;  // of slices across the layers of the file
 };
 
 // The lattice of a series along its columns, rows and slices.
@@ -40,13 +41,15 @@ ImageLattice images_of(const Volume& series);
 std::array<std::uint32_t, 3> dims_along(const Geometry& images, const Volume& labels);
 
 // `images` is the geometry of the series, along its columns, rows and slices, and `dims` their
-// numbers. Throws Error kUnusableVolume, with the reason, for label
-// volumes that have other sizes, are elsewhere, or have labels that share values.
+// numbers. Throws Error kUnusableVolume, with the reason, for label volumes that have other sizes,
+// are elsewhere, or have labels that share values.
 LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>& dims,
                      const Volume& labels);
 
-// The slices where the segments have samples, by segment, then by slice. `labels` are those of the
-// segments. Throws Error kCancelled, kTooLarge for more frames than an object may have, and
+// The slices where the segments have samples, by segment, then by slice. If slices lie across the
+// layers of the file, windows of them come one after another, so that write_frames reads each
+// window once. Takes the memory of a window (`window_bytes`, or one slice). `labels` are those of
+// the segments. Throws Error kCancelled, kTooLarge for more frames than an object may have, and
 // kInternal if the blob is damaged.
 std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
                                                 std::span<const std::int64_t> labels,

@@ -255,12 +255,13 @@ Volume import_structures(const std::filesystem::path& path,
     check_limits(volume.sample_count(), type, task.limits);
     volume.type = type;
     CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
-    const auto combinations = drawing.write(type, writer.samples());
+    auto combinations = drawing.write(type, writer.samples());
     if (!combinations) continue;
     if (drawing.drawn().empty()) {
       throw_unusable("No contour of the DICOM structure set lies on the grid" +
                      std::string(task.options.spacing ? ". " : " of its images. ") + remedy);
     }
+    combinations->sort_values(type, writer.samples());
     volume.labels = combinations->entries(entries_of(set, drawing.drawn()));
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
     add_notes(set, drawing, remedy, volume);

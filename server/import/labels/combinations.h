@@ -14,8 +14,8 @@
 namespace isomesh::import {
 
 // Numbers the combinations of labels of samples. A single label keeps its number. Other
-// combinations get free numbers above the highest label, in the order of the requests. Not thread
-// safe.
+// combinations get free numbers above the highest label, in the order of the requests, until
+// sort_values(). Not thread safe.
 class Combinations {
  public:
   // A sample's labels so far. The default has none.
@@ -45,7 +45,8 @@ class Combinations {
   bool write(std::span<const State> states, SampleType type, std::span<std::byte> target);
 
   // Numbers the combinations anew, in the order of their labels. So their numbers do not depend on
-  // the order in which samples were written. `samples` are all that were written, as `type`.
+  // the order in which samples were written. `samples` are all that were written, as `type`. Call
+  // it before entries(); otherwise a file that is stored the other way is another volume.
   void sort_values(SampleType type, std::span<std::byte> samples);
 
   // A note on the number of written samples with several labels; empty if there are none.

@@ -381,14 +381,8 @@ void take_storage_order(const StorageOrder& fastest, Volume& volume) {
 }  // namespace
 
 void put_in_order(CanonicalWriter& writer, Volume& volume) {
-  const volume::AxisOrder order = volume::canonical_order(volume.geometry);
   if (!volume.stored_axes) volume.stored_axes = volume::axis_codes(volume.geometry);
-  volume.geometry = volume::canonical_geometry(volume.dims, volume.geometry);
-  volume::put_in_order(writer.samples(), bytes_per_sample(volume.type), volume.dims, order);
-  volume.dims = volume::in_order(volume.dims, order);
-  if (const auto fault = find_fault(volume.dims, volume.geometry)) {
-    throw_unusable("The geometry of the volume cannot be used: " + fault->message + ".");
-  }
+  volume::make_canonical(writer.samples(), volume);
 }
 
 Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task) {

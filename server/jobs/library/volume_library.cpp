@@ -88,15 +88,6 @@ std::string codes_of_file(const std::string& file, const std::string& codes) {
   return result;
 }
 
-// The sum of two changes of the orientation. The second one names the axes of a copy. These are
-// those of the patient, as they are in the first volume. Copies of older versions kept the order of
-// their samples, so their axes were turned by the first change.
-volume::AxisOrder sum_of(const volume::AxisOrder& first, const volume::AxisOrder& second,
-                         const Geometry& copy) {
-  return volume::canonical_order(copy) == volume::kFilesOrder ? volume::in_turn(second, first)
-                                                              : volume::in_turn(first, second);
-}
-
 // Gives the lattice of the volume its new directions, and adds a note. The samples are still in the
 // order of the old ones.
 void turn(Volume& volume, const volume::AxisOrder& order) {
@@ -107,7 +98,10 @@ void turn(Volume& volume, const volume::AxisOrder& order) {
   if (const auto fault = volume::find_fault(volume.dims, volume.geometry)) {
     volume::throw_unusable("In this orientation, " + fault->message);
   }
-  const volume::AxisOrder total = sum_of(take_orientation(volume.notes), order, before);
+  // The copy has the axes of the patient, so its note tells the changes of these. A volume of an
+  // older version, and its note, may have the axes of its file.
+  const volume::AxisOrder total =
+      volume::along_patient(volume::in_turn(order, take_orientation(volume.notes)), before);
   if (volume.stored_axes) {
     volume.stored_axes = codes_of_file(*volume.stored_axes, volume::axis_codes(volume.geometry));
   }
@@ -138,10 +132,7 @@ void copy_samples(const volume::CanonicalFile& from, Volume& volume,
     offset += piece.size();
     rest = rest.subspan(piece.size());
   }
-  const volume::AxisOrder order = volume::canonical_order(volume.geometry);
-  volume::put_in_order(writer.samples(), bytes_per_sample(volume.type), volume.dims, order);
-  volume.geometry = volume::canonical_geometry(volume.dims, volume.geometry);
-  volume.dims = volume::in_order(volume.dims, order);
+  volume::make_canonical(writer.samples(), volume, stop);
   writer.shorten({volume.dims, volume.type, volume.geometry});
 }
 

@@ -22,6 +22,7 @@ namespace {
 using dicom::SegmentationFrame;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 constexpr std::array<std::uint32_t, 3> kSizes = {3, 2, 2};
 
@@ -172,7 +173,7 @@ TEST_F(SegmentationTest, HasTheOrderOfTheImages) {
 TEST_F(SegmentationTest, HasTheOrderOfTheImagesHoweverTheLabelsAreStored) {
   test::SampleVolume<std::uint8_t> labels = {
       .samples = {}, .dims = {3, 4, 5}, .geometry = test::oblique_geometry()};
-  for (int n = 0; n < 3 * 4 * 5; ++n) labels.samples.push_back(n * n % 7 / 2);
+  for (int n = 0; n < 3 * 4 * 5; ++n) labels.samples.push_back(n * 7 % 11 / 3);
   const std::array<std::uint32_t, 3> sizes = {3, 4, 5};
   std::string expected;
   for (const test::Storage& storage : test::all_storages()) {
@@ -184,6 +185,25 @@ TEST_F(SegmentationTest, HasTheOrderOfTheImagesHoweverTheLabelsAreStored) {
     EXPECT_EQ(bits, expected);
   }
   EXPECT_THAT(expected, HasSubstr("3@4 "));
+}
+
+// The frames of a window of slices come together, so that it is read once for all segments.
+TEST_F(SegmentationTest, OfSlicesAcrossTheFileGoesOnFromWindowToWindow) {
+  test::SampleVolume<std::uint8_t> labels = {.samples = {}, .dims = {3, 2, 5}, .geometry = {}};
+  for (int n = 0; n < 3 * 2 * 5; ++n) labels.samples.push_back(n % 2 + 1);
+  const std::array<std::uint32_t, 3> sizes = {3, 2, 5};
+  int across = 0;
+  for (const test::Storage& storage : test::all_storages()) {
+    const auto stored = stored_as(labels, storage);
+    LabelGrid grid = grid_of(stored.samples, stored.geometry, labels.geometry, sizes,
+                             {stored.dims.x, stored.dims.y, stored.dims.z});
+    grid.window_bytes = 13;  // two slices
+    if (grid.axes[2] == 2) continue;
+    ++across;
+    EXPECT_THAT(bits_of(grid, {1, 2}), StartsWith("1@0 1@1 2@0 2@1 1@2 1@3 2@2 2@3 1@4 2@4 "
+                                                  "1.1.1.1.1.1..1.1.1.1.1.1"));
+  }
+  EXPECT_EQ(across, 32);
 }
 
 // They are counted before they are all in memory: noise has most labels in each slice.

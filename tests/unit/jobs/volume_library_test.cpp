@@ -1,7 +1,9 @@
 #include "server/jobs/library/volume_library.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <filesystem>
 #include <functional>
 #include <stop_token>
 #include <string>
@@ -407,6 +409,35 @@ TEST_F(VolumeLibraryTest, SamplesThatAreStoredAgainStayBeforeTheyAreNamed) {
     blobs_.adopt(again, store::digest_of(again), "", {});
   });
   EXPECT_EQ(blob_count(), 1U);
+}
+
+// Earlier versions stored volumes in the order of their files. The copy of such a volume has the
+// axes of the patient, and so has the change that undoes the first one.
+TEST_F(VolumeLibraryTest, AChangeOfAVolumeInTheOrderOfItsFileCanBeUndone) {
+  const volume::AxisOrder file = {3, 1, -2};  // its index i increases towards the head
+  Volume old = add_bytes(bytes_).first;
+  old.geometry = volume::in_order(old.dims, old.geometry, file);
+  old.dims = volume::in_order(old.dims, file);
+  old.stored_axes.reset();
+  old.id = std::string(64, 'a');
+  const std::filesystem::path stored = data_.scratch() / "old";
+  std::ranges::fill(volume::CanonicalWriter(stored, {old.dims, old.type, old.geometry}).samples(),
+                    std::byte{7});
+  const store::Blob blob = store::digest_of(stored);
+  blobs_.adopt(stored, blob, "", {});
+  old.samples = blob.key;
+  volumes_.add("", old);
+  blobs_.mark_named(blob.key);
+  const auto orientation = [](const Volume& volume) {
+    const auto note =
+        std::ranges::find(volume.notes, std::string("orientation-changed"), &Note::code);
+    return note == volume.notes.end() ? "" : note->detail;
+  };
+  const Volume flipped = library_.reorient("", old.id, {-1, 2, 3}).first;
+  EXPECT_TRUE(orientation(flipped).ends_with("gives to x,y,-z.")) << orientation(flipped);
+  const Volume back = library_.reorient("", flipped.id, {1, 2, -3}).first;
+  EXPECT_EQ(orientation(back), "");
+  EXPECT_EQ(back.dims, kDims);
 }
 
 TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "server/volume/geometry.h"
 #include "server/volume/sample_order.h"
 
@@ -140,6 +142,58 @@ TEST(CanonicalOrder, IsKeptByARepetition) {
   }
 }
 
+// Sums of cosines that differ by 1e-4, the border of the rule, but for the rounding of cosines.
+TEST(CanonicalOrder, IsKeptByARepetitionNearTheBorderOfTies) {
+  const double border = std::asin(1e-4 / (2 * std::numbers::sqrt2));
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> offset(-1e-9, 1e-9);
+  for (int at = 0; at < 3000; ++at) {
+    Vector3 axis = {0, 0, 0};
+    axis[static_cast<std::size_t>(at % 3)] = 1;
+    const double angle = std::numbers::pi / 4 + (at % 2 == 0 ? border : -border) + offset(random);
+    const Geometry lattice = {.spacing = {1, 2, 3}, .direction = rotation(angle, axis)};
+    Dims dims = kDims;
+    Geometry once = lattice;
+    EXPECT_EQ(make_canonical(dims, once), canonical_order(lattice));
+    const Geometry first = once;
+    ASSERT_EQ(make_canonical(dims, once), kFilesOrder) << angle;
+    EXPECT_EQ(once, first);
+  }
+}
+
+// Two changes one after another are the change that their sum names, also of a volume whose axes
+// are in the order of a file. The copy between has those of the patient.
+TEST(CanonicalOrder, OfACopyKeepsTheSumOfItsChanges) {
+  const auto inverse = [](const AxisOrder& order) {
+    AxisOrder back = {};
+    for (std::size_t at = 0; at < order.size(); ++at) {
+      const int axis = static_cast<int>(at) + 1;
+      back[static_cast<std::size_t>(std::abs(order[at]) - 1)] = order[at] < 0 ? -axis : axis;
+    }
+    return back;
+  };
+  const std::vector<AxisOrder> seconds = {{1, 2, 3}, {-1, 2, 3}, {1, 2, -3}, {2, -1, 3}, {3, 1, 2}};
+  const Geometry patient = {.origin = {-9, 4, 7}, .spacing = {0.7, 0.8, 1.5}};
+  for (const AxisOrder& storage : storages()) {
+    const Geometry stored = in_order(kDims, patient, storage);
+    for (const AxisOrder& first : storages()) {
+      for (const AxisOrder& second : seconds) {
+        Dims dims = in_order(kDims, storage);
+        Geometry copy = reoriented(dims, stored, first);
+        AxisOrder moved = make_canonical(dims, copy);
+        const AxisOrder total = along_patient(in_turn(second, along_patient(first, stored)), copy);
+        for (const AxisOrder& change : {second, inverse(total)}) {
+          copy = reoriented(dims, copy, change);
+          moved = in_turn(moved, make_canonical(dims, copy));
+        }
+        // The samples are where those of the first volume are in the canonical order.
+        ASSERT_EQ(moved, canonical_order(stored)) << to_string(first) << ' ' << to_string(second);
+        EXPECT_EQ(copy, patient);
+      }
+    }
+  }
+}
+
 TEST(CanonicalOrder, LeavesTheCornersOfALatticeInTheirPlaces) {
   for (const Geometry& lattice : lattices()) {
     const AxisOrder order = canonical_order(lattice);
@@ -232,6 +286,21 @@ TEST(SampleOrder, MovesSamplesOfAllSizes) {
     expect_in_order<std::uint16_t>(dims);
     expect_in_order<std::uint32_t>(dims);
     expect_in_order<std::uint64_t>(dims);
+  }
+}
+
+TEST(SampleOrder, EndsWhenItIsStopped) {
+  std::stop_source source;
+  source.request_stop();
+  std::vector<std::byte> samples(60);
+  for (const AxisOrder& order : storages()) {
+    if (order == kFilesOrder) continue;
+    try {
+      put_in_order(samples, 1, {5, 4, 3}, order, source.get_token());
+      ADD_FAILURE() << to_string(order);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+    }
   }
 }
 

@@ -428,6 +428,7 @@ bool write_labels(const Stack& stack, SampleType type, const ReadSlice& read,
   }
   Combinations combinations(highest_segment(stack));
   if (!write_combinations(stack, type, read, target, combinations)) return false;
+  combinations.sort_values(type, target);
   volume.labels = combinations.entries(entries_of(segments_in(stack)));
   if (auto note = combinations.note()) volume.notes.push_back(std::move(*note));
   return true;

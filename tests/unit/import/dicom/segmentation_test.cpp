@@ -151,6 +151,33 @@ TEST(DicomSegmentation, WithOverlapsBeyondEightBitsHasWiderValues) {
               testing::ElementsAre(entry(1, "liver", {1, 256}), entry(255, "", {255, 256})));
 }
 
+// The numbers of combinations must not follow the order of planes and rows in the file.
+TEST(DicomSegmentation, WithOverlapsIsOneVolumeInEachOrderOfItsPlanes) {
+  SegmentObject object = {.frames = {{.z = 0, .segment = 1, .labels = {0, 12}},
+                                     {.z = 0, .segment = 2, .labels = {0}},
+                                     {.z = 0, .segment = 3, .labels = {12}},
+                                     {.z = 2, .segment = 2, .labels = {4, 7}},
+                                     {.z = 2, .segment = 3, .labels = {4, 7}}},
+                          .segments = {"liver", "spleen", "lesion"}};
+  const Outcome first = imported(import_objects({{"seg", segmentation(object).file(kExplicit)}}));
+  // Rows run the other way, and so does the normal of the planes.
+  for (SegmentFrame& frame : object.frames) {
+    for (unsigned& place : frame.labels) {
+      const unsigned row = place / kSegmentColumns;
+      place += kSegmentColumns * (kSegmentRows - 1) - 2 * row * kSegmentColumns;
+    }
+  }
+  DicomObject mirrored = segmentation(object);
+  mirrored.items(kSharedFunctionalGroups, {shared_groups("0.5\\0.75", "1\\0\\0\\0\\-1\\0")});
+  const Outcome other = imported(import_objects({{"seg", mirrored.file(kExplicit)}}));
+  EXPECT_EQ(other.volume.stored_axes, "LAI");
+  EXPECT_EQ(other.stored.substr(kHeaderBytes), first.stored.substr(kHeaderBytes));
+  EXPECT_EQ(other.volume.labels, first.volume.labels);
+  EXPECT_THAT(first.volume.labels,
+              testing::ElementsAre(entry(1, "liver", {4, 5}), entry(2, "spleen", {4, 6}),
+                                   entry(3, "lesion", {5, 6})));
+}
+
 TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   SegmentObject object = two_segments();
   object.slice_distance = "1.0";

@@ -28,9 +28,9 @@ const DicomSeries kImages = {.columns = 20,
                              .between_rows = 1,
                              .between_columns = 1};
 
-NamedFiles with_images(const DicomObject& structures) {
+NamedFiles with_images(const DicomObject& structures, const DicomSeries& images = kImages) {
   NamedFiles files = changed(
-      kImages, [](DicomObject& object) { object.text(kFrameOfReferenceUid, "UI", "1.2.3.frame"); });
+      images, [](DicomObject& object) { object.text(kFrameOfReferenceUid, "UI", "1.2.3.frame"); });
   files.emplace_back("RS", structures.file(kImplicit));
   return files;
 }
@@ -193,6 +193,28 @@ TEST(DicomStructures, OfSeparatePartsAreNotJoined) {
                                               {box(4.5, 4.5, 8.5, 10.5, 14)}}}});
   for (std::uint32_t k = 0; k < 8; ++k) EXPECT_EQ(sample(outcome, 6, 6, k), k < 2 || k > 5) << k;
   EXPECT_EQ(note_detail(outcome, NoteCode::kContoursInterpolated), "");
+}
+
+// The numbers of combinations must not follow the order of planes and rows in the images.
+TEST(DicomStructures, ThatOverlapAreOneVolumeInEachOrderOfTheirImages) {
+  const DicomObject structures =
+      structure_set({{.number = 1, .name = "a", .contours = {{box(1.5, 1.5, 8.5, 6.5, 4)}}},
+                     {.number = 2, .name = "b", .contours = {{box(3.5, 2.5, 5.5, 4.5, 4)}}},
+                     {.number = 3, .name = "c", .contours = {{box(1.5, 1.5, 8.5, 6.5, 10)}}},
+                     {.number = 4, .name = "d", .contours = {{box(3.5, 2.5, 5.5, 4.5, 10)}}}});
+  const Outcome first = imported(import_objects(with_images(structures), {.series = "1.2.9"}));
+  DicomSeries mirrored = kImages;
+  mirrored.origin[1] = 15;
+  mirrored.along_column = {0, -1, 0};
+  const Outcome other =
+      imported(import_objects(with_images(structures, mirrored), {.series = "1.2.9"}));
+  EXPECT_EQ(first.volume.stored_axes, "LPS");
+  EXPECT_EQ(other.volume.stored_axes, "LAI");
+  EXPECT_EQ(other.stored, first.stored);
+  EXPECT_EQ(other.volume.labels, first.volume.labels);
+  ASSERT_EQ(first.volume.labels.size(), 4);
+  EXPECT_THAT(first.volume.labels[1].values, ElementsAre(5));
+  EXPECT_THAT(first.volume.labels[3].values, ElementsAre(6));
 }
 
 TEST(DicomStructures, MayOverlap) {
