@@ -262,8 +262,8 @@ class Verifier {
     count("Edges where a triangle is turned against its neighbour", places[3], true);
   }
 
-  // Normals must point outwards, as those of the surface do. Where the surface has both of
-  // its sides within the bound, as a thin wall has, a triangle may face either.
+  // Normals must point outwards, as those of the surface do. If both sides of the
+  // surface are within the bound, as at a thin wall, a triangle may face either.
   void check_sides(const std::vector<Nearest>& nearest) {
     const Surface& mesh = mesh_.surface();
     const auto components = components_of(mesh);

@@ -75,7 +75,7 @@ process.exit();
 
 @dataclass
 class Ending:
-    """What becomes of a job, and what each client says of it. A client that fails leaves no file."""
+    """The end of a job, and what each client says of it. A client that fails leaves no file."""
 
     says: str = "^"
     job: dict = field(default_factory=dict)  # members that differ from those of a job that succeeds

@@ -152,8 +152,8 @@ std::string told_parameters(MeshParameters parameters, SendFormat format) {
   return std::string(beginning(text, kLongest - kMore.size())) + std::string(kMore);
 }
 
-// The largest distance from the extracted surface: proven, or as it was found. What smoothing moved
-// adds to a distance from the smoothed surface.
+// The largest distance from the extracted surface: proven, or as it was found. The displacement
+// by smoothing adds to a distance from the smoothed surface.
 double deviation_mm(const MeshSummary& mesh) {
   const MeshCertificate& certificate = *mesh.certificate;
   const double simplified = certificate.bound_mm.value_or(certificate.found_mm);

@@ -55,10 +55,10 @@ class Part {
   std::vector<WallSides> sides_;
 };
 
-// Looks at all points of a proposal, and of the original surface. Where one is beyond the error, if
-// there is one, or where a triangle that changed intersects another one, it moves vertices back,
-// and undoes collapses once all vertices there are back. From the second round on, it only looks at
-// what may have changed.
+// Looks at all points of a proposal, and of the original surface. If a point is beyond the limit of
+// the error, or if a triangle that changed intersects another one, it moves vertices there back. It
+// undoes collapses once all of them are back. From the second round on, it only looks at what may
+// have changed.
 class Checker {
  public:
   Checker(const SimplifyOptions& options, const Context& context, const Mesh& mesh,

@@ -233,7 +233,7 @@ export class Client {
 
   /**
    * Downloads a finished job's mesh in one of the formats that the job was asked for. Rejects with a RangeError if the
-   * job has no such file. Of a format that holds one label, a job with several labels has only the `zip`. Rejects with
+   * job has no such file. If a format holds one label, a job with several labels has only the `zip`. Rejects with
    * an ApiError with the status 422 if the surface is empty, unless `allowEmpty` is true.
    */
   async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal, { allowEmpty = false }: { allowEmpty?: boolean } = {}): Promise<ArrayBuffer> {

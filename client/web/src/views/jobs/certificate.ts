@@ -46,7 +46,7 @@ export function referenceText({ reference }: Pick<Certificate, 'reference'>): st
   return `${reference} surface`;
 }
 
-// The distance of the mesh from the extracted surface: proven, or as it was found. What smoothing moved adds to a distance from the smoothed surface.
+// The distance of the mesh from the extracted surface: proven, or as it was found. The displacement by smoothing adds to a distance from the smoothed surface.
 export function fromExtracted(mesh: Pick<MeshSummary, 'certificate' | 'displacement_mm'>): { mm: number; proven: boolean } | null {
   const { certificate, displacement_mm: moved } = mesh;
   if (!certificate) return null;
