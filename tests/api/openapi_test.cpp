@@ -167,6 +167,9 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   job.parameters.certify = true;
   job.parameters.min_thickness_mm = 0.4;
   job.parameters.untangle = true;
+  job.parameters.inside = Inside::kBelow;
+  job.mesh->empty_reason = "why";
+  job.mesh->notes = {note_of(NoteCode::kThinWalls, "1 cavity")};
   job.mesh->untangled.emplace();
   job.mesh->simplified.emplace();
   job.mesh->thickness.emplace().place = {{1, 2, 3}};
@@ -254,7 +257,8 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   }
   check.expect_all();
   // None of an answer's members may be missing, but for those of some jobs only.
-  const std::set<std::string> of_some = {"Volume dicom", "Estimate iso", "Estimate labels",
+  const std::set<std::string> of_some = {"Volume dicom",          "Volume stored_axes",
+                                         "Estimate iso",          "Estimate labels",
                                          "Estimate labels_count", "Estimate simplified_triangles"};
   for (const auto& [schema, text] : complete) {
     if (schema == "JobParameters" || schema == "Problem") continue;
@@ -297,6 +301,7 @@ TEST_F(OpenApiTest, DefaultsAreThoseOfTheProgram) {
   // These are left out where they are as by default.
   defaults["glb_codec"] = to_string(JobParameters{}.glb_codec);
   defaults["space"] = to_string(JobParameters{}.space);
+  defaults["inside"] = to_string(JobParameters{}.inside);
   const YAML::Node properties = api_.schema("JobParameters")["properties"];
   int compared = 0;
   for (const auto& property : properties) {
