@@ -102,9 +102,10 @@ TEST_F(CommandReachTest, AnIsoValueBeyondTheSamplesIsExplained) {
   EXPECT_EQ(result.status, 1);
   EXPECT_THAT(result.errors, HasSubstr("isomesh: "));
   EXPECT_THAT(result.errors,
-              HasSubstr("no surface at the iso-value 9999; its samples range from 0 to "));
+              HasSubstr("the surface is empty: the iso-value 9999 separates none of the samples"));
+  EXPECT_THAT(result.errors, HasSubstr("which range from 0 to "));
   const std::string job = daemon_.client().jobs().jobs.at(0).id;
-  EXPECT_THAT(command("wait " + job).errors, HasSubstr("its samples range from 0 to "));
+  EXPECT_THAT(command("wait " + job).errors, HasSubstr("which range from 0 to "));
 }
 
 // A shell ends its loop if the command has died by SIGINT, and goes on if it has exited.

@@ -316,7 +316,7 @@ TEST_F(MeshInOne, ASurfaceThatIsThereHasNoReason) {
     EXPECT_THAT(job, Not(HasSubstr("empty_reason"))) << query;
   }
   EXPECT_TRUE(blames(post("iso=100&allow_empty=yes"), "allow_empty"));
-  EXPECT_TRUE(blames(post("iso=100&allow_empty=true&allow_empty=true"), "allow_empty"));
+  EXPECT_TRUE(blames(post("iso=100&allow_empty=true&allow_empty=false"), "allow_empty"));
 }
 
 // Its first response may be followed by the mesh, without another upload's job.

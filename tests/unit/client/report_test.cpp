@@ -127,6 +127,7 @@ TEST(MeshReport, OffersTheOtherSideOfASurfaceThatIsInsideOut) {
 
 TEST(MeshReport, SaysThatALabelThatIsInsideOutEnclosesNothing) {
   MeshSummary mesh;
+  mesh.quality.oriented = true;
   mesh.labels = {{.label = 1, .closed = true, .oriented = true, .volume_mm3 = -27}};
   const std::string report = mesh_report(mesh);
   EXPECT_THAT(report, HasSubstr(" none "));
@@ -234,9 +235,9 @@ TEST(VolumeReport, NamesWhatDicomTells) {
   volume.ignored = {{"DICOMDIR", "it is a directory of DICOM files"}};
   volume.dicom.emplace().patient_name = "Doe^John";
   const std::string report = volume_report(volume);
-  EXPECT_THAT(report, HasSubstr("modality       CT"));
-  EXPECT_THAT(report, HasSubstr("iso of bone    250"));
-  EXPECT_THAT(report, HasSubstr("ignored        DICOMDIR: it is a directory of DICOM files"));
+  EXPECT_THAT(report, HasSubstr("modality          CT"));
+  EXPECT_THAT(report, HasSubstr("iso of bone       250"));
+  EXPECT_THAT(report, HasSubstr("ignored           DICOMDIR: it is a directory of DICOM files"));
   EXPECT_THAT(report, Not(HasSubstr("Doe")));  // a terminal may be anybody's
 }
 

@@ -218,7 +218,7 @@ TEST_F(WorkitemTest, IsCanceledWhenItsOrderFails) {
   EXPECT_EQ(get(id).state, OrderState::kFailed);
   EXPECT_THAT(get(id).error->detail, HasSubstr("the surface is empty"));
   EXPECT_EQ(list_->state(), "CANCELED");
-  EXPECT_THAT(list_->last_update(), testing::Not(HasSubstr("surface")));
+  EXPECT_THAT(list_->last_update(), testing::Not(HasSubstr("iso-value")));
 }
 
 TEST_F(WorkitemTest, OfAnotherPatientThanItsImagesIsCanceled) {
