@@ -32,7 +32,9 @@ std::uint32_t component_near(const Vec& place, const Surface& surface,
 
 // Samples below the iso-value that no path along edges connects with the border of the volume.
 void fill_cavities(const Cut& cut, Field& field) {
-  const auto& [nx, ny, nz] = field.dims;
+  const auto nx = field.dims[0];
+  const auto ny = field.dims[1];
+  const auto nz = field.dims[2];
   const auto number = [&](const Sample& s) {
     return static_cast<std::size_t>((s[2] * ny + s[1]) * nx + s[0]);
   };

@@ -235,12 +235,13 @@ std::vector<WallArea> measure_walls(const SeparatingSurface& surface, const Voxe
   });
   std::map<std::pair<std::size_t, std::size_t>, WallArea> found;
   for (const auto& layer : layers) {
-    for (const auto& [sides, area] : layer) {
-      visit_pairs(surface.parts, sides, [&](auto pair) { found[pair].area_mm2 += area; });
+    for (const auto& wall : layer) {
+      visit_pairs(surface.parts, wall.first,
+                  [&](auto pair) { found[pair].area_mm2 += wall.second; });
     }
   }
-  for (const auto& [sides, count] : faces) {
-    visit_pairs(surface.parts, sides, [&](auto pair) { found[pair].faces += count; });
+  for (const auto& wall : faces) {
+    visit_pairs(surface.parts, wall.first, [&](auto pair) { found[pair].faces += wall.second; });
   }
   std::vector<WallArea> walls;
   for (const auto& [pair, wall] : found) {
