@@ -137,10 +137,10 @@ TEST_F(ThinWallsTest, OfLabelsAreLookedForFromTheSmallestBoxUntilTimeIsSpent) {
                                  {.x = 79.6, .wall = 1.5, .value = 10}};
   const auto with_large_labels = [&](std::uint8_t others) {
     auto samples = balls(all);
-    const auto [x, y, z] = samples.dims;
+    const auto dims = samples.dims;
     const auto spread = [&](std::uint8_t value, std::uint32_t i, std::uint32_t j) {
       samples.at(i, j, 0) = value;
-      samples.at(x - 1 - i, y - 1 - j, z - 1) = value;
+      samples.at(dims.x - 1 - i, dims.y - 1 - j, dims.z - 1) = value;
     };
     spread(9, 0, 0);
     for (std::uint8_t n = 1; n <= others; ++n) spread(n, n % 2, n / 2);
