@@ -35,7 +35,7 @@ std::vector<ExtractOptions> open_options(double iso) {
 // In order, each beginning with its smallest vertex.
 std::vector<Triangle> sorted(std::vector<Triangle> triangles) {
   for (Triangle& triangle : triangles) {
-    std::ranges::rotate(triangle, std::ranges::min_element(triangle));
+    std::rotate(triangle.begin(), std::ranges::min_element(triangle), triangle.end());
   }
   std::ranges::sort(triangles);
   return triangles;
