@@ -18,7 +18,7 @@ struct ErrorDescription {
   std::string_view title;
 };
 
-// Of every code.
+// One for every code.
 std::span<const ErrorDescription> error_descriptions();
 
 // Constant time; every code has a description.

@@ -6,8 +6,8 @@
 namespace isomesh {
 namespace {
 
-// Whoever writes the object anew drops the blank. So an older version that changed the record
-// leaves one without a digest, not one with a wrong digest.
+// A program that writes the object anew drops the blank. So an older version that changed the
+// record leaves one without a digest, not one with a wrong digest.
 constexpr std::string_view kBegin = R"(, "digest":")";
 constexpr std::string_view kEnd = R"("})";
 constexpr std::size_t kDigits = 32;  // of the 64 of SHA-256

@@ -132,7 +132,7 @@ class Arguments(LimitedTest):
                 target = to if callable(to) else folder / to
                 with self.subTest(text), self.assertRaisesRegex(ValueError, text):
                     isomesh_client.Client("http://127.0.0.1:1").mesh_all([folder / each for each in sources], to=target, **keywords)
-            # What is skipped is not replaced: a mesh may lie in the folder of its slices.
+            # A skipped source is not replaced: a mesh may lie in the folder of its slices.
             (folder / "whole").mkdir()
             (folder / "whole" / "slice.dcm").write_bytes(b"volume")
             (folder / "whole" / "mesh.stl").write_bytes(b"mesh")

@@ -12,7 +12,7 @@ namespace isomesh::orders {
 // one. Throws Error kUnusableVolume.
 void check_identity(const DicomIdentity& identity);
 
-// What is made of one patient's images must not complete the workitem of another one. Throws Error
+// Results of one patient's images must not complete the workitem of another one. Throws Error
 // kUnusableVolume.
 void check_patient_of_workitem(const OrderWork& work, const DicomIdentity& identity);
 

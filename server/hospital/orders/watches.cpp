@@ -19,8 +19,8 @@ std::string day_before(store::Time now, std::uint32_t days) {
   return utc_text(now - std::chrono::days(days) - std::chrono::days(1), "%Y%m%d");
 }
 
-// How far back watches look, and at least a quarter of a year: a series that is forgotten before
-// would be ordered again.
+// The time that watches look back, and at least a quarter of a year: a series that is forgotten
+// before would be ordered again.
 std::chrono::days longest_look(const std::vector<Rule>& rules) {
   constexpr std::chrono::days kMargin{2};  // of dates without time zones
   std::chrono::days longest{90};

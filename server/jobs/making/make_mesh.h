@@ -97,7 +97,7 @@ struct CountedSurface {
   mesh::SurfaceSize size;
   std::vector<Estimate::Label> labels = {};  // of a job by labels
 
-  // Of all labels' own surfaces.
+  // The sum over all labels' own surfaces.
   std::uint64_t triangles_of_labels() const {
     std::uint64_t sum = 0;
     for (const Estimate::Label& label : labels) sum += label.triangles;

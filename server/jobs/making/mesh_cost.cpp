@@ -80,7 +80,7 @@ bool takes_more_walked(const mesh::SurfaceSize& surface, const MeshParameters& p
   return mesh::walking_memory(options, surface, {}) > 2 * whole;
 }
 
-// How many times as many surfaces labels have than if none overlapped, at least 1.
+// The factor by which overlaps multiply the surfaces of labels, at least 1.
 std::uint64_t overlaps_of(const mesh::SurfaceSize& surface, std::uint64_t of_labels) {
   const std::uint64_t usual = std::max<std::uint64_t>(1, 2 * surface.triangles);
   return std::max<std::uint64_t>(1, (of_labels + usual - 1) / usual);

@@ -19,8 +19,8 @@ WallShape::WallShape(const SeparatingSurface& surface, const Dims& dims,
 
 namespace {
 
-// How far from a face a vertex in it may be, in samples along each axis: far from the origin, steps
-// of single precision are no small part of a sample.
+// The distance of a vertex from the face that it lies in, at most, in samples along each axis: far
+// from the origin, steps of single precision are no small part of a sample.
 class NearFace {
  public:
   explicit NearFace(const LatticeToSpace& to_space) {

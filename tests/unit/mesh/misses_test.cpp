@@ -59,7 +59,8 @@ TEST(Misses, OfSurfacesSideBySideDependOnTheirDistanceAlone) {
   }
 }
 
-// Of an electron micrograph, in millimetres, or closer than single precision tells places apart.
+// The scale of an electron micrograph, in millimetres, or closer than single precision tells places
+// apart.
 TEST(Misses, OfTheSmallestSurfacesAreFoundAsWell) {
   const auto scaled = [](Surface surface, float scale) {
     for (Vec3& position : surface.positions) {

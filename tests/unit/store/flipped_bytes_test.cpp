@@ -29,7 +29,8 @@ namespace {
 // Before a row's key in its cell are its length and the types of its columns.
 constexpr std::size_t kHeaderBytes = 16;
 
-// Of a long record. SQLite moves the end of a row above 1002 bytes to another page.
+// The part of a long record that is tried. SQLite moves the end of a row above 1002 bytes to
+// another page.
 constexpr std::size_t kOnItsPage = 200;
 
 class FlippedBytes : public testing::Test {

@@ -12,7 +12,7 @@ function part(number: number, begin: number, area: number): PartSummary {
 const before = [part(0, 0, 6), part(1, 10, 9), part(2, 20, 3)];
 const after = [part(0, 20, 3), part(1, 0, 6), part(2, 10, 9)];
 
-// Where the shown ones begin.
+// The beginnings of the shown ones.
 const shownOf = (parts: HiddenParts): number[] => parts.shown.map(({ low }) => low[0]);
 
 function hidingTheFirst(): HiddenParts {

@@ -1,4 +1,4 @@
-// Which parts of a surface are hidden, also when the same surface comes with other triangles, whose parts have other numbers.
+// The parts of a surface that are hidden, also when the same surface comes with other triangles, whose parts have other numbers.
 import { foundAnew, type PartSummary } from './part_finder';
 
 export class HiddenParts {

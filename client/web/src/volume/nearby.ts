@@ -27,7 +27,7 @@ export class Nearby<T> {
     return entry.wanted;
   }
 
-  // What arrives goes into its own entry, so nothing is kept after its entry has left.
+  // An answer goes into its own entry, so nothing is kept after its entry has left.
   private begin(key: string, make: () => Promise<T>): Kept<T> {
     const entry: Kept<T> = { wanted: make(), made: null };
     entry.wanted.then(

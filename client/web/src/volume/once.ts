@@ -1,4 +1,4 @@
-// What is asked for once. After a failure the next call asks again.
+// An answer that is asked for once. After a failure the next call asks again.
 export class Once<T> {
   private key: string | null = null;
   private made: Promise<T> | null = null;

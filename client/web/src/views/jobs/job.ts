@@ -29,7 +29,7 @@ function stagesOf({ parameters }: Job): string[] {
   return stages.filter((name) => !isLeftOut[name]);
 }
 
-// What the job was made of. The volume may be missing while its surface is still there.
+// The volume that the job was made of. It may be missing while its surface is still there.
 interface Source {
   volume: Volume | null;
   name: string;

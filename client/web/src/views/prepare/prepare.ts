@@ -424,7 +424,7 @@ class Prepare {
     this.problem.replaceChildren();
     try {
       const job = await client.submitJob(jobRequest(this.parameters));
-      // Whoever went elsewhere meanwhile is told when it has ended.
+      // A person who went elsewhere meanwhile is told when it has ended.
       if (!this.scope.isOver) go(['jobs', job.id]);
     } catch (error) {
       const failure = asApiError(error);

@@ -2,7 +2,7 @@
 import type { Scope } from '../../ui/signal';
 
 export interface CutPicturesHost<Picture> {
-  // Of the place that is wanted when it is called.
+  // The picture is of the place that is wanted when it is called.
   fetch: () => Promise<Picture>;
   onPicture: (picture: Picture, place: string) => void;
   // The picture that is wanted failed.
