@@ -100,7 +100,9 @@ std::int64_t Database::shift() const {
 
 std::int64_t Database::to_us(Time time) const { return store::to_us(time) + shift(); }
 
-Time Database::from_us(std::int64_t us) const { return store::from_us(us - shift()); }
+Time Database::from_us(std::int64_t us) const {
+  return store::from_us(store::to_us(store::from_us(us)) - shift());
+}
 
 std::chrono::steady_clock::time_point Database::steady_of(std::int64_t us) const {
   return std::chrono::steady_clock::time_point(std::chrono::microseconds(us - beyond_steady_us_));
