@@ -438,7 +438,7 @@ class SlowUser : public Collector {
     if (window.first_layer > 0 || part > 0) return end;
     return [this, end = std::move(end)] {
       {
-        constexpr std::chrono::seconds kLongest(10);
+        constexpr std::chrono::seconds kLongest(60);  // on a busy machine
         Lock lock(mutex_);
         has_gone_on_ = changed_.wait_for(lock, kLongest,
                                          [this]() ISOMESH_REQUIRES(mutex_) { return begun_ > 1; });
