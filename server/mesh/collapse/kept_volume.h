@@ -8,7 +8,7 @@
 // are undone later need no places of their own.
 #pragma once
 
-#include <limits>
+#include <cstdint>
 #include <span>
 #include <vector>
 

@@ -129,6 +129,7 @@ class Checker {
     is_first_ = 2 * fresh_.size() > proposal.numbers.size();
     if (is_first_) {
       fresh_ = proposal.numbers;
+      std::ranges::sort(fresh_);
       doubtful_.resize(corners_.size());
       std::iota(doubtful_.begin(), doubtful_.end(), 0U);
     } else {
