@@ -8,7 +8,7 @@
 // are undone later need no places of their own.
 #pragma once
 
-#include <limits>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -22,16 +22,17 @@ namespace isomesh::mesh::collapse {
 // The largest turn of a triangle by moved vertices, as a cosine.
 inline constexpr double kLeastCosineOfMoves = 0.5;
 
-// Returns places for all vertices of the mesh, whose collapses are in `history`. Those that are
-// gone, on a cap, or at the end of an open surface and beside it, have their own, and those of
-// junction curves without `sides`. None moves across a cap. No other moves farther than
-// `most_mm`, nor than half the length of its shortest edge, and no triangle turns farther than
-// kLeastCosineOfMoves or loses its area. `sides`: of the mesh's triangles, empty if all are of one
-// wall. Each wall keeps the volume on its sides, as far as these limits allow. The same for any
-// number of threads. Throws Error kCancelled.
-std::vector<Vec3> places_with_volume(const Mesh& mesh, std::span<const WallSides> sides,
-                                     const History& history, double most_mm,
-                                     const Context& context);
+// Moves vertices of the mesh, whose collapses are in `history`, from these places. Those that are
+// gone, on a cap, or at the end of an open surface and beside it stay, as do those of junction
+// curves without `sides`, and those that are held. `is_held`: of each vertex; empty if none is.
+// None moves across a cap. No other is farther than `most_mm` from its own place, nor than half the
+// length of its shortest edge, and no triangle turns farther than kLeastCosineOfMoves or loses its
+// area. `sides`: of the mesh's triangles, empty if all are of one wall. Each wall keeps the volume
+// on its sides, as far as these limits allow. The same for any number of threads. Throws Error
+// kCancelled.
+void keep_volume(const Mesh& mesh, std::span<const WallSides> sides, const History& history,
+                 std::span<const std::uint8_t> is_held, double most_mm, const Context& context,
+                 std::vector<Vec3>& places);
 
 // True if moved corners turn a triangle of the mesh's vertices too far, or leave it no area.
 bool is_turned(const Mesh& mesh, std::span<const Vec3> places, const Triangle& corners);

@@ -20,6 +20,7 @@ struct Proposal {
   std::vector<std::uint32_t> numbers;  // of each: that of the original triangle that became it
   collapse::History history;
   std::vector<Vec3> places = {};  // of the original vertices, where they have moved to
+  std::vector<std::uint8_t> is_moved_back = {};  // of the original vertices, by repairs
 };
 
 // The surface as it was, from which the error is measured.

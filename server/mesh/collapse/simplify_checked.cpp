@@ -9,6 +9,7 @@
 
 #include "server/mesh/collapse/kept_volume.h"
 #include "server/mesh/collapse/misses.h"
+#include "server/mesh/collapse/part_volumes.h"
 #include "server/mesh/collapse/proposal.h"
 #include "server/mesh/collapse/simplify.h"
 #include "server/mesh/collapse/simplify_layers.h"
@@ -22,6 +23,11 @@ namespace {
 constexpr int kMostRepairs = 24;
 constexpr int kMostMoves = 6;  // rounds that only move vertices back
 constexpr int kMostProposals = 4;
+// A part's volume changes by no larger share, if that can be reached in so many rounds. The first
+// ones undo nothing.
+constexpr double kMostChange = 0.003;
+constexpr int kMostRestorations = 10;
+constexpr int kMovesAlone = 2;
 
 bool is_left(const Triangle& corners) {
   return corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0];
@@ -97,22 +103,72 @@ class Checker {
   }
 
  private:
+  // Looks at what differs from the last proposal, if there was one.
   void begin(const Proposal& proposal) {
-    corners_.assign(original_.view.triangles.size(), Triangle{});
+    std::vector<Triangle> corners(mesh_.triangles.size(), Triangle{});
     for (std::size_t n = 0; n < proposal.numbers.size(); ++n) {
-      corners_[proposal.numbers[n]] = proposal.triangles[n];
+      corners[proposal.numbers[n]] = proposal.triangles[n];
     }
-    fresh_ = proposal.numbers;
-    std::ranges::sort(fresh_);
-    doubtful_.resize(corners_.size());
-    std::iota(doubtful_.begin(), doubtful_.end(), 0U);
+    const auto is_same = [&](std::uint32_t t) {
+      return corners[t] == corners_[t] && std::ranges::all_of(corners[t], [&](std::uint32_t v) {
+               return proposal.places[v] == places_[v];
+             });
+    };
+    fresh_ = std::exchange(faults_, {});
+    std::vector<Box> changed;
+    for (std::uint32_t t = 0; t < corners.size(); ++t) {
+      if (!corners_.empty() && is_same(t)) continue;
+      if (!corners_.empty()) note_box(t, changed);
+      fresh_.push_back(t);
+    }
+    corners_ = std::move(corners);
     places_ = proposal.places;
     pulls_.assign(places_.size(), 0);
-    is_first_ = true;
+    for (const std::uint32_t t : fresh_) note_box(t, changed);
+    make_fresh_a_set();
+    is_first_ = 2 * fresh_.size() > proposal.numbers.size();
+    if (is_first_) {
+      fresh_ = proposal.numbers;
+      std::ranges::sort(fresh_);
+      doubtful_.resize(corners_.size());
+      std::iota(doubtful_.begin(), doubtful_.end(), 0U);
+    } else {
+      doubt_near(changed);
+    }
+  }
+
+  void note_box(std::uint32_t t, std::vector<Box>& boxes) const {
+    if (is_left(corners_[t])) boxes.push_back(box_of({places_, corners_}, corners_[t]));
+  }
+
+  void make_fresh_a_set() {
+    std::ranges::sort(fresh_);
+    fresh_.erase(std::unique(fresh_.begin(), fresh_.end()), fresh_.end());
+    std::erase_if(fresh_, [&](std::uint32_t t) { return !is_left(corners_[t]); });
+  }
+
+  // Triangles of the original surface near these boxes may have lost what they were near to.
+  void doubt_near(std::span<const Box> changed) {
+    if (grids_ == nullptr) return;
+    const MarkedCubes near_changed(changed, within_mm_);
+    std::vector<std::uint8_t> is_doubtful(corners_.size());
+    for_each(context_, corners_.size(), [&](std::size_t t) {
+      const Box box = box_of(original_.view, original_.view.triangles[t]);
+      is_doubtful[t] = near_changed.are_near(box) ? 1 : 0;
+    });
+    for (const std::uint32_t t : lost_) is_doubtful[t] = 1;
+    doubtful_.clear();
+    for (std::uint32_t t = 0; t < corners_.size(); ++t) {
+      if (is_doubtful[t] != 0) doubtful_.push_back(t);
+    }
   }
 
   void take(Proposal& proposal) const {
     proposal.places = places_;
+    proposal.is_moved_back.resize(places_.size());
+    for (std::size_t v = 0; v < pulls_.size(); ++v) {
+      if (pulls_[v] != 0) proposal.is_moved_back[v] = 1;
+    }
     proposal.numbers.clear();
     proposal.triangles.clear();
     for (std::uint32_t t = 0; t < corners_.size(); ++t) {
@@ -188,9 +244,6 @@ class Checker {
     const bool are_any_moved = std::ranges::find(is_pulled, 1) != is_pulled.end();
     if (count == 0 && !are_any_moved) return false;
     std::vector<Box> changed;
-    const auto note = [&](std::uint32_t t) {
-      if (is_left(corners_[t])) changed.push_back(box_of({places_, corners_}, corners_[t]));
-    };
     fresh_.clear();
     if (count > 0 && !which.empty()) {
       fresh_ = history.undo(mesh_.triangles.span(), which, count);
@@ -201,30 +254,17 @@ class Checker {
           is_left(corners_[t]) && (is_pulled[a] | is_pulled[b] | is_pulled[c]) != 0;
       if (is_moved) fresh_.push_back(t);
     }
-    for (const std::uint32_t t : fresh_) note(t);
+    for (const std::uint32_t t : fresh_) note_box(t, changed);
     for (std::uint32_t v = 0; v < is_pulled.size(); ++v) {
       if (is_pulled[v] != 0) pull(v);
     }
     for (const std::uint32_t t : fresh_) {
       corners_[t] = history.corners_of(mesh_.triangles[t]);
-      note(t);
+      note_box(t, changed);
     }
     fresh_.insert(fresh_.end(), faults_.begin(), faults_.end());
-    std::ranges::sort(fresh_);
-    fresh_.erase(std::unique(fresh_.begin(), fresh_.end()), fresh_.end());
-    std::erase_if(fresh_, [&](std::uint32_t t) { return !is_left(corners_[t]); });
-    if (grids_ == nullptr) return are_any_moved;
-    const MarkedCubes near_changed(changed, within_mm_);
-    std::vector<std::uint8_t> is_doubtful(corners_.size());
-    for_each(context_, corners_.size(), [&](std::size_t t) {
-      const Box box = box_of(original_.view, original_.view.triangles[t]);
-      is_doubtful[t] = near_changed.are_near(box) ? 1 : 0;
-    });
-    for (const std::uint32_t t : lost_) is_doubtful[t] = 1;
-    doubtful_.clear();
-    for (std::uint32_t t = 0; t < corners_.size(); ++t) {
-      if (is_doubtful[t] != 0) doubtful_.push_back(t);
-    }
+    make_fresh_a_set();
+    doubt_near(changed);
     return are_any_moved;
   }
 
@@ -254,6 +294,56 @@ class Checker {
   bool is_first_ = true;
 };
 
+// Vertices that were moved back, and those that are not beside a changed part.
+std::vector<std::uint8_t> held(std::span<const std::uint8_t> are_changed,
+                               std::span<const WallSides> sides, const Proposal& proposal) {
+  std::vector<std::uint8_t> is_held(proposal.places.size(), 1);
+  for (std::size_t n = 0; n < proposal.triangles.size(); ++n) {
+    const WallSides& beside = sides[proposal.numbers[n]];
+    if ((are_changed[beside.front] | are_changed[beside.back]) == 0) continue;
+    for (const std::uint32_t v : proposal.triangles[n]) is_held[v] = proposal.is_moved_back[v];
+  }
+  return is_held;
+}
+
+void undo(std::span<const std::uint32_t> which, const Mesh& mesh, Proposal& proposal) {
+  proposal.history.undo(mesh.triangles.span(), which, 1);
+  proposal.triangles.clear();
+  proposal.numbers.clear();
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle corners = proposal.history.corners_of(mesh.triangles[t]);
+    if (!is_left(corners)) continue;
+    proposal.numbers.push_back(t);
+    proposal.triangles.push_back(corners);
+  }
+}
+
+// Moves vertices so that the surface keeps its volume, and repairs what that spoils. What repairs
+// take from a part is given back by the other vertices beside it, and then by undone collapses.
+// Returns true if all points are within the error.
+bool move_and_repair(const SimplifyOptions& options, const Context& context,
+                     const WalledSurface& surface, const Mesh& mesh,
+                     const collapse::PartVolumes& volumes, Checker& checker, Proposal& proposal) {
+  proposal.places.assign(mesh.positions.begin(), mesh.positions.end());
+  if (!options.keeps_volume) return checker.repair(proposal);
+  std::vector<std::uint8_t> is_held;
+  for (int round = 0;; ++round) {
+    collapse::keep_volume(mesh, surface.sides, proposal.history, is_held, options.max_error_mm,
+                          context, proposal.places);
+    const bool is_within = checker.repair(proposal);
+    const std::vector<double> changes =
+        volumes.changes(proposal.places, proposal.triangles, proposal.numbers);
+    const std::vector<std::uint8_t> are_changed = volumes.beyond(kMostChange, changes);
+    const bool is_any = std::ranges::find(are_changed, 1) != are_changed.end();
+    if (!is_any || round == kMostRestorations) return is_within;
+    if (round >= kMovesAlone) {
+      undo(volumes.to_undo(kMostChange, changes, mesh, proposal.history, proposal.places), mesh,
+           proposal);
+    }
+    is_held = held(are_changed, surface.sides, proposal);
+  }
+}
+
 // Proposals with fewer triangles than asked for, if repairs add some. Where only the number counts,
 // it goes first: the proposal is as it was if repairs add too many.
 Proposal propose_and_repair(const SimplifyOptions& options, const Context& context,
@@ -268,17 +358,13 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
   Checker checker(options, quiet, mesh, original);
   SimplifyOptions asked = options;
   std::optional<Proposal> first;  // as it was proposed, where only the number counts
-  const auto find_places = [&](Proposal& proposal) {
-    if (options.keeps_volume) {
-      proposal.places = collapse::places_with_volume(mesh, surface.sides, proposal.history,
-                                                     options.max_error_mm, quiet);
-    } else {
-      proposal.places.assign(mesh.positions.begin(), mesh.positions.end());
-    }
-  };
+  const collapse::PartVolumes volumes(mesh, surface.sides);
   const auto as_proposed = [&](Proposal proposal) {
-    find_places(proposal);
-    if (options.keeps_volume) checker.move_back(proposal);
+    proposal.places.assign(mesh.positions.begin(), mesh.positions.end());
+    if (!options.keeps_volume) return proposal;
+    collapse::keep_volume(mesh, surface.sides, proposal.history, {}, options.max_error_mm, quiet,
+                          proposal.places);
+    checker.move_back(proposal);
     return proposal;
   };
   for (int attempt = 1;; ++attempt) {
@@ -288,8 +374,7 @@ Proposal propose_and_repair(const SimplifyOptions& options, const Context& conte
     const bool was_reached = effect.reached_triangles;
     if (!grids && !was_reached) return as_proposed(std::move(first ? *first : proposal));
     if (!grids && !first && options.triangles > 0) first = proposal;
-    find_places(proposal);
-    effect.is_within = checker.repair(proposal);
+    effect.is_within = move_and_repair(options, quiet, surface, mesh, volumes, checker, proposal);
     effect.triangles_after = proposal.triangles.size();
     if (options.triangles == 0) return proposal;
     effect.reached_triangles = effect.triangles_after <= options.triangles;

@@ -78,15 +78,35 @@ double largest_change(const Case& one, const SeparatingSurface& surface) {
 
 TEST(KeptVolume, IsThatOfTheVoxelsWithinABound) {
   for (const Case& one : cases()) {
-    for (const double voxels : {0.5, 1.0}) {
+    for (const double voxels : {0.5, 1.0, 2.0}) {
       SeparatingSurface surface = smoothed(one);
       const SimplificationEffect effect = simplify({.max_error_mm = voxels}, {}, surface);
       EXPECT_TRUE(effect.is_within) << one.name;
       EXPECT_LT(effect.triangles_after, effect.triangles_before / 3) << one.name;
-      // Labels that crowd together lose a little more.
-      const double most = one.labels == 1 ? 0.01 * voxels : 0.01;
-      EXPECT_LE(largest_change(one, surface), most) << one.name << ", " << voxels;
+      EXPECT_LE(largest_change(one, surface), 0.005) << one.name << ", " << voxels;
     }
+  }
+}
+
+// Thin plates that touch each other, whose vertices are nearly all on junction curves and beside
+// them, so that repairs move many back.
+TEST(KeptVolume, IsThatOfThinLabels) {
+  Case one = {"plates", test::constant<std::uint8_t>(0, {30, 30, 24}), 6};
+  for (std::uint32_t k = 4; k < 20; ++k) {
+    for (std::uint32_t j = 4; j < 26; ++j) {
+      for (std::uint32_t i = 4; i < 26; ++i) {
+        const double x = i - 15.0;
+        const double y = j - 15.0;
+        const double wave = k + 1.5 * std::sin(0.5 * x) + 1.5 * std::cos(0.4 * y);
+        if (x * x + y * y > 110 || wave < 6 || wave >= 18) continue;
+        one.volume.at(i, j, k) = static_cast<std::uint8_t>((wave - 6) / 2 + 1);
+      }
+    }
+  }
+  for (const double voxels : {0.5, 1.0, 2.0}) {
+    SeparatingSurface surface = smoothed(one);
+    EXPECT_TRUE(simplify({.max_error_mm = voxels}, {}, surface).is_within);
+    EXPECT_LE(largest_change(one, surface), 0.003) << voxels;
   }
 }
 
