@@ -111,9 +111,14 @@ double Progress::elapsed_ms() const {
 CountedSurface count_surface(const SampleArray& samples, const MeshRequest& request,
                              const mesh::Context& context) {
   const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
-  return {with_sample(samples.type, [&](auto sample) {
+  CountedSurface counted;
+  counted.size = with_sample(samples.type, [&](auto sample) {
     return size_of(mesh::count_surface(lattice_of<decltype(sample)>(samples), options, context));
-  })};
+  });
+  if (searches_cavities(samples, request.parameters, context)) {
+    counted.searching_bytes = cavity_search_memory(samples, counted.size);
+  }
+  return counted;
 }
 
 void Workspace::trim(std::size_t budget_bytes) {
