@@ -9,6 +9,7 @@
 #include "proto/stages.h"
 #include "server/codec/formats.h"
 #include "server/jobs/making/certify_stage.h"
+#include "server/jobs/making/changed_volume.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
@@ -67,6 +68,11 @@ void leave_out_parts(const MeshParameters& parameters, const Progress& progress,
   if (!parameters.components.keeps_all()) {
     add(keep_components(parameters.components, progress.quiet(), mesh));
   }
+}
+
+// Adds a note on the volume, if there is one and the surface encloses a volume.
+void tell(const std::optional<Note>& on_volume, MeshSummary& summary) {
+  if (on_volume && summary.quality.encloses_volume) summary.notes.push_back(*on_volume);
 }
 
 }  // namespace
@@ -136,6 +142,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   std::vector<Note> notes = notes_on_thin_walls(samples, request, progress.quiet());
   if (walked) {
     walked->notes = std::move(notes);
+    tell(note_on_changed_volume(parameters, *walked), *walked);
     return *std::move(walked);
   }
   MeshSummary summary;
@@ -147,6 +154,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
 
   smooth_stage(samples, request, progress, mesh, summary);
   untangle_stage(parameters, extracted, progress, mesh, summary);
+  const std::optional<Note> changed_volume = note_on_changed_volume(parameters, summary);
   const MeshParameters as_written = with_bits_for(parameters, mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, mesh, nullptr, summary);
@@ -157,6 +165,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   const KeptFiles files(written, sinks);
   encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
                      summary);
+  tell(changed_volume, summary);
   certify_stage(written, extracted, files, progress, mesh, summary);
   const auto itself = [&](std::size_t) -> const mesh::Mesh& { return mesh; };
   thickness_stage(request, 1, itself, progress, summary);
