@@ -175,6 +175,12 @@ constexpr NoteDescription kNoteDescriptions[] = {
          "names another `scheme`, if one closes more of the cavities. Jobs by labels, jobs with "
          "`fill_cavities` or `components`, and those on masks look for such cavities.",
      .is_of_mesh = true},
+    {.code = NoteCode::kVolumeChanged,
+     .name = "volume-changed",
+     .meaning = "Only of a closed mesh at an iso-value. Smoothing changed its volume by more than "
+                "1 %. The detail says by how much, and which parameters change it less. Thin parts "
+                "and sharp edges lose the most.",
+     .is_of_mesh = true},
 };
 
 }  // namespace

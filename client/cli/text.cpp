@@ -106,10 +106,12 @@ std::string shell_word(std::string_view text) {
 }
 
 std::string with_options(std::string text) {
-  constexpr std::array<std::array<std::string_view, 2>, 10> kOptions = {
+  constexpr std::array<std::array<std::string_view, 2>, 12> kOptions = {
       {{"\"labels\": \"all\"", "--labels all"},
        {"nifti_form=", "--nifti-form "},
        {"scheme=", "--scheme "},
+       {"smoothing=", "--smoothing "},
+       {"regularize=false", "--no-regularize"},
        {"member=NAME", "--member NAME"},
        {"series=UID", "--series UID"},
        {"volume=N", "--volume N"},

@@ -69,12 +69,14 @@ class WallFile {
 
   WallFile(const Job& job, const store::BlobStore& blobs)
       : has_faces_(job.mesh->edge_contacts_count.has_value()),
-        count_(*job.mesh->walls_count + job.mesh->edge_contacts_count.value_or(0)) {
+        walls_(*job.mesh->walls_count),
+        count_(walls_ + job.mesh->edge_contacts_count.value_or(0)) {
     if (count_ == 0) return;
     if (!job.mesh->wall_list) throw_damaged();
     file_ = blobs.open(job.mesh->wall_list->sha256);
     if (file_->size() / wall_bytes() != count_ || file_->size() % wall_bytes() != 0)
       throw_damaged();
+    walls_first_ = are_walls_first();
   }
 
   // False in jobs of older servers, which list all walls.
@@ -82,9 +84,16 @@ class WallFile {
 
   Page page(std::uint64_t begin, bool edge_contacts, std::uint64_t labels) const {
     Page page;
-    for (std::uint64_t at = begin; at < count_; at += kPerPage) {
-      const auto here = read_walls(at, labels);
+    const std::uint64_t end = walls_first_ && !edge_contacts ? walls_ : count_;
+    const bool is_all_shown = walls_first_ || edge_contacts || !has_faces_;
+    for (std::uint64_t at = begin; at < end; at += kPerPage) {
+      if (is_all_shown && page.walls.size() == kPerPage) {
+        page.next = at;
+        return page;
+      }
+      const auto here = read_walls(at, std::min<std::uint64_t>(kPerPage, end - at));
       for (std::size_t n = 0; n < here.size(); ++n) {
+        check(here[n], labels);
         if (has_faces_ && here[n].faces == 0 && !edge_contacts) continue;
         if (page.walls.size() == kPerPage) {
           page.next = at + n;
@@ -99,27 +108,40 @@ class WallFile {
  private:
   std::size_t wall_bytes() const { return (has_faces_ ? 4 : 3) * kNumberBytes; }
 
-  // At most kPerPage walls.
-  std::vector<mesh::WallArea> read_walls(std::uint64_t begin, std::uint64_t labels) const {
-    std::vector<std::byte> bytes(std::min<std::uint64_t>(kPerPage, count_ - begin) * wall_bytes());
+  // False if walls and edge contacts ascend together, as in files of older servers. A file in which
+  // all contacts follow all walls in that order as well is taken for such a one, and read as a
+  // whole.
+  bool are_walls_first() const {
+    if (!has_faces_ || walls_ == 0 || walls_ == count_) return true;
+    const auto place = [](const mesh::WallArea& wall) { return std::pair(wall.a, wall.b); };
+    const auto both = read_walls(walls_ - 1, 2);
+    return place(both[0]) > place(both[1]);
+  }
+
+  static void check(const mesh::WallArea& wall, std::uint64_t labels) {
+    const bool is_possible = wall.a > 0 && std::max(wall.a, wall.b) <= labels && wall.a != wall.b &&
+                             std::isfinite(wall.area_mm2);
+    if (!is_possible) throw_damaged();
+  }
+
+  std::vector<mesh::WallArea> read_walls(std::uint64_t begin, std::uint64_t count) const {
+    std::vector<std::byte> bytes(count * wall_bytes());
     read(*file_, begin * wall_bytes(), bytes);
     std::vector<mesh::WallArea> walls;
     for (std::size_t at = 0; at < bytes.size(); at += wall_bytes()) {
       const auto number = [&](std::size_t n) {
         return number_at(std::span(bytes).subspan(at + n * kNumberBytes, kNumberBytes));
       };
-      const mesh::WallArea wall = {number(0), number(1), std::bit_cast<double>(number(2)),
-                                   has_faces_ ? number(3) : 0};
-      const bool is_possible = wall.a > 0 && std::max(wall.a, wall.b) <= labels &&
-                               wall.a != wall.b && std::isfinite(wall.area_mm2);
-      if (!is_possible) throw_damaged();
-      walls.push_back(wall);
+      walls.push_back(
+          {number(0), number(1), std::bit_cast<double>(number(2)), has_faces_ ? number(3) : 0});
     }
     return walls;
   }
 
   const bool has_faces_;
+  const std::uint64_t walls_;  // that are no edge contacts
   const std::uint64_t count_;
+  bool walls_first_ = true;
   std::unique_ptr<store::BlobReader> file_;  // null if there are no walls
 };
 
@@ -241,11 +263,14 @@ std::map<std::uint64_t, LabelSummary> JobLabels::at(const std::set<std::uint64_t
 
 void write_walls(std::span<const mesh::WallArea> walls, const codec::Sink& sink) {
   std::vector<std::byte> bytes;
-  for (const mesh::WallArea& wall : walls) {
-    append(wall.a, bytes);
-    append(wall.b, bytes);
-    append(std::bit_cast<std::uint64_t>(wall.area_mm2), bytes);
-    append(wall.faces, bytes);
+  for (const bool edge_contacts : {false, true}) {
+    for (const mesh::WallArea& wall : walls) {
+      if ((wall.faces == 0) != edge_contacts) continue;
+      append(wall.a, bytes);
+      append(wall.b, bytes);
+      append(std::bit_cast<std::uint64_t>(wall.area_mm2), bytes);
+      append(wall.faces, bytes);
+    }
   }
   sink(bytes);
 }

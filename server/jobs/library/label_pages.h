@@ -5,8 +5,10 @@
 // number.
 //
 // Its walls are in a file, too: for each one four such numbers, the places of its two labels among
-// the job's (from 1 on; 0 for the background), the bits of its area and its number of faces. Files
-// of jobs without MeshSummary::edge_contacts_count lack the last.
+// the job's (from 1 on; 0 for the background), the bits of its area and its number of faces. Those
+// of labels that share faces come first, so that a list of them reads no others. Both ascend by the
+// two places. In files of older servers they ascend together, and those of jobs without
+// MeshSummary::edge_contacts_count lack the number of faces.
 #pragma once
 
 #include <cstddef>
@@ -75,7 +77,7 @@ class JobLabels {
   std::uint64_t end_of_pages_ = 0;
 };
 
-// Writes the file of a job's walls.
+// Writes the file of a job's walls, which ascend.
 void write_walls(std::span<const mesh::WallArea> walls, const codec::Sink& sink);
 
 struct WallPage {

@@ -49,6 +49,7 @@ void visit(Is<CountedSurface> auto& self, auto&& field) {
   field("layers", self.size.layers);
   field("largest_runs", self.size.largest_runs);
   field("labels", self.labels);
+  field("searching_bytes", self.searching_bytes);
 }
 
 namespace {

@@ -47,22 +47,22 @@ mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& lab
   return options;
 }
 
-void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
-              const MeshRequest& request, const Progress& progress,
-              mesh::SeparatingSurface& walls) {
+void separate(const SampleArray& samples, std::span<const mesh::LabelVoxels> labels,
+              const mesh::SeparateOptions& options, const MeshRequest& request,
+              const Progress& progress, mesh::SeparatingSurface& walls) {
   with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::Context context = progress.context();
     const mesh::Context quiet = progress.quiet();
     const mesh::SurfaceCount count = count_walls(lattice, options, context.part(0.2, 0.4));
-    std::uint64_t of_labels = 0;
+    MemoryUse use = {.searching_bytes = cavity_search_memory(samples, labels, size_of(count))};
     // Each triangle is in the surfaces of two labels at most, unless labels share samples.
     if (mesh::LabelParts(options.labels, options.values).overlap()) {
       for (const std::uint64_t each : count_label_triangles(lattice, options, count, quiet)) {
-        of_labels += each;
+        use.of_labels += each;
       }
     }
-    check_memory(size_of(count), lattice.dims.samples(), request, of_labels);
+    check_memory(size_of(count), lattice.dims.samples(), request, use);
     extract_walls(lattice, options, count, context.part(0.4, 1), walls);
   });
 }
@@ -163,12 +163,13 @@ std::vector<mesh::LabelVoxels> count_values(const SampleArray& samples,
 
 CountedSurface count_labels(const SampleArray& samples, const MeshParameters& parameters,
                             const mesh::Context& context) {
-  const auto options =
-      separate_options(mesh::chosen_labels(count_values(samples, context), parameters), parameters);
+  const auto labels = mesh::chosen_labels(count_values(samples, context), parameters);
+  const auto options = separate_options(labels, parameters);
   return with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::SurfaceCount count = count_walls(lattice, options, context);
-    CountedSurface counted = {.size = size_of(count), .labels = {}};
+    CountedSurface counted = {.size = size_of(count)};
+    counted.searching_bytes = cavity_search_memory(samples, labels, counted.size);
     const auto triangles = count_label_triangles(lattice, options, count, context);
     for (std::size_t n = 0; n < options.labels.size(); ++n) {
       counted.labels.push_back({options.labels[n], triangles[n + 1]});
@@ -187,7 +188,7 @@ MadeLabels make_labels(const SampleArray& samples, const MeshRequest& request,
   const auto labels =
       mesh::chosen_labels(count_values(samples, progress.context().part(0, 0.2)), parameters);
   const mesh::SeparateOptions options = separate_options(labels, parameters);
-  separate(samples, options, request, progress, walls);
+  separate(samples, labels, options, request, progress, walls);
   summary.notes = notes_on_thin_walls(samples, labels, parameters, progress.quiet());
   if (!is_simplified(parameters)) check_disk(size_of(walls.mesh), request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());

@@ -9,6 +9,7 @@
 #include "proto/stages.h"
 #include "server/codec/formats.h"
 #include "server/jobs/making/certify_stage.h"
+#include "server/jobs/making/changed_volume.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
@@ -69,6 +70,11 @@ void leave_out_parts(const MeshParameters& parameters, const Progress& progress,
   }
 }
 
+// Adds a note on the volume, if there is one and the surface encloses a volume.
+void tell(const std::optional<Note>& on_volume, MeshSummary& summary) {
+  if (on_volume && summary.quality.encloses_volume) summary.notes.push_back(*on_volume);
+}
+
 }  // namespace
 
 Progress::Progress(std::stop_token stop, const Report& report, const Timing& expected)
@@ -111,9 +117,14 @@ double Progress::elapsed_ms() const {
 CountedSurface count_surface(const SampleArray& samples, const MeshRequest& request,
                              const mesh::Context& context) {
   const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
-  return {with_sample(samples.type, [&](auto sample) {
+  CountedSurface counted;
+  counted.size = with_sample(samples.type, [&](auto sample) {
     return size_of(mesh::count_surface(lattice_of<decltype(sample)>(samples), options, context));
-  })};
+  });
+  if (searches_cavities(samples, request.parameters, context)) {
+    counted.searching_bytes = cavity_search_memory(samples, counted.size);
+  }
+  return counted;
 }
 
 void Workspace::trim(std::size_t budget_bytes) {
@@ -131,6 +142,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   std::vector<Note> notes = notes_on_thin_walls(samples, request, progress.quiet());
   if (walked) {
     walked->notes = std::move(notes);
+    tell(note_on_changed_volume(parameters, *walked), *walked);
     return *std::move(walked);
   }
   MeshSummary summary;
@@ -142,6 +154,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
 
   smooth_stage(samples, request, progress, mesh, summary);
   untangle_stage(parameters, extracted, progress, mesh, summary);
+  const std::optional<Note> changed_volume = note_on_changed_volume(parameters, summary);
   const MeshParameters as_written = with_bits_for(parameters, mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, mesh, nullptr, summary);
@@ -152,6 +165,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   const KeptFiles files(written, sinks);
   encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
                      summary);
+  tell(changed_volume, summary);
   certify_stage(written, extracted, files, progress, mesh, summary);
   const auto itself = [&](std::size_t) -> const mesh::Mesh& { return mesh; };
   thickness_stage(request, 1, itself, progress, summary);

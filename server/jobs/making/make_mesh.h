@@ -96,6 +96,7 @@ struct MeshRequest {
 struct CountedSurface {
   mesh::SurfaceSize size;
   std::vector<Estimate::Label> labels = {};  // of a job by labels
+  std::uint64_t searching_bytes = 0;         // of memory, if the job looks for cavities
 
   // The sum over all labels' own surfaces.
   std::uint64_t triangles_of_labels() const {

@@ -209,9 +209,9 @@ bool sets_aside(std::uint64_t samples) {
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                               const MeshParameters& parameters, const Measures& measures,
-                              std::uint64_t of_labels, bool has_spool) {
+                              const MemoryUse& use) {
   if (is_walked(surface, parameters, measures)) {
-    return walked_bytes(surface, samples, parameters, has_spool);
+    return std::max(walked_bytes(surface, samples, parameters, use.has_spool), use.searching_bytes);
   }
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
@@ -220,27 +220,29 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t sa
   const std::uint64_t smoothing = removes_stairs(parameters)
                                       ? mesh::stairs_memory(surface)
                                       : smoothing_memory(smooth_options(parameters), surface);
-  const std::uint64_t overlaps = overlaps_of(surface, of_labels);
+  const std::uint64_t overlaps = overlaps_of(surface, use.of_labels);
   const std::uint64_t made = smoothing + (parameters.labels ? 2 * overlaps * encoding : encoding) +
                              error_bytes(surface, samples, parameters, measures);
   if (parameters.labels) {
     const std::uint64_t writing =
         static_cast<std::uint64_t>(mesh::thread_count()) *
         mesh::wall_writing_memory(samples / planes_of(surface, parameters));
-    return mesh_bytes(surface) + label_bytes(surface, overlaps) + std::max(writing, made);
+    return mesh_bytes(surface) + label_bytes(surface, overlaps) +
+           std::max({writing, made, use.searching_bytes});
   }
   // The C library keeps what the joined crossings took, in small blocks.
   const std::uint64_t joined = is_regularized(parameters) ? surface.vertices * kJoinedPerVertex : 0;
   const std::uint64_t writing = writing_bytes(samples, surface, parameters);
   const std::uint64_t filling =
       parameters.fill_cavities ? mesh::filling_memory(surface.vertices, surface.triangles) : 0;
-  return mesh_bytes(surface) + joined + std::max({writing, made, filling});
+  return mesh_bytes(surface) + joined + std::max({writing, made, filling, use.searching_bytes});
 }
 
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                  const MeshRequest& request, std::uint64_t of_labels) {
-  const std::uint64_t needed = estimate_memory(
-      surface, samples, request.parameters, request.measures, of_labels, request.spool != nullptr);
+                  const MeshRequest& request, MemoryUse use) {
+  use.has_spool = request.spool != nullptr;
+  const std::uint64_t needed =
+      estimate_memory(surface, samples, request.parameters, request.measures, use);
   const std::uint64_t allowed_bytes = request.memory_bytes;
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kMebibyte = 1 << 20;

@@ -38,17 +38,26 @@ mesh::WalkOptions walk_options(mesh::SmoothOptions smooth, const MeshParameters&
 // in memory.
 bool sets_aside(std::uint64_t samples);
 
+// What takes memory beside a surface.
+struct MemoryUse {
+  // Labels have two triangles for each of their walls together, or so many, if they overlap.
+  std::uint64_t of_labels = 0;
+  // The search for cavities, before the surface is smoothed or after it was walked through.
+  std::uint64_t searching_bytes = 0;
+  // Without a spool, jobs keep in memory what they would set aside.
+  bool has_spool = true;
+};
+
 // An upper estimate of a job's peak memory beside its mapped volume: mesh, smoothing, encoders,
-// simplifying and certifying. For a surface of that size in a volume of so many samples. Labels
-// have two triangles for each of their walls together, or more if they overlap: `of_labels`.
-// Without a spool, jobs keep in memory what they would set aside.
+// simplifying and certifying. For a surface of that size in a volume of so many samples.
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                               const MeshParameters& parameters, const Measures& measures,
-                              std::uint64_t of_labels = 0, bool has_spool = true);
+                              const MemoryUse& use = {});
 
-// Throws Error kTooLarge with the estimate if that exceeds the limit.
+// Throws Error kTooLarge with the estimate if that exceeds the limit. The request says whether
+// there is a spool.
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
-                  const MeshRequest& request, std::uint64_t of_labels = 0);
+                  const MeshRequest& request, MemoryUse use);
 
 // Throws Error kTooLarge if the disk could never hold the files of the mesh. Half counts of sizes
 // that are guesses. Call it with the size of the mesh that is written.

@@ -24,6 +24,9 @@ using Open = mesh::CavityCount::Open;
 // The most samples of all boxes that are searched, in multiples of the volume's: boxes overlap.
 constexpr std::uint64_t kMostSearches = 4;
 
+// The most schemes that are compared with the job's in one search.
+constexpr std::size_t kMostOthers = 2;
+
 // The cavities that a surface leaves open, and those that another scheme would.
 struct ThinWalls {
   Open open;
@@ -170,12 +173,9 @@ mesh::SignRows rows_of(const mesh::Lattice<T>& lattice, const Box& box,
 std::vector<Note> notes_on_thin_walls(const SampleArray& samples, const MeshRequest& request,
                                       const mesh::Context& context) {
   const MeshParameters& parameters = request.parameters;
+  if (!searches_cavities(samples, parameters, context)) return {};
   return with_sample(samples.type, [&](auto sample) -> std::vector<Note> {
     const auto lattice = lattice_of<decltype(sample)>(samples);
-    if (!parameters.fill_cavities && parameters.components.keeps_all() &&
-        !is_mask(lattice, context)) {
-      return {};
-    }
     const mesh::ExtractOptions options = extract_options(parameters, request.iso);
     const auto others = others_of({Scheme::kFive, Scheme::kBcc, Scheme::kSix}, options.scheme);
     const ThinWalls walls =
@@ -230,6 +230,39 @@ std::vector<Note> notes_on_thin_walls(const SampleArray& samples,
                                                       open_text(rest.open) + '.'));
   }
   return notes;
+}
+
+bool searches_cavities(const SampleArray& samples, const MeshParameters& parameters,
+                       const mesh::Context& context) {
+  if (parameters.fill_cavities || !parameters.components.keeps_all()) return true;
+  return with_sample(samples.type, [&](auto sample) {
+    return is_mask(lattice_of<decltype(sample)>(samples), context);
+  });
+}
+
+std::uint64_t cavity_search_memory(const SampleArray& samples, const mesh::SurfaceSize& surface) {
+  return mesh::cavity_search_memory({.dims = {samples.dims[0], samples.dims[1], samples.dims[2]},
+                                     .vertices = surface.vertices,
+                                     .schemes = kMostOthers});
+}
+
+std::uint64_t cavity_search_memory(const SampleArray& samples,
+                                   std::span<const mesh::LabelVoxels> labels,
+                                   const mesh::SurfaceSize& walls) {
+  const mesh::Dims volume = {samples.dims[0], samples.dims[1], samples.dims[2]};
+  const std::vector<std::size_t> searched = searched_labels(labels, volume);
+  mesh::Dims largest = {};
+  for (const std::size_t n : searched) {
+    const auto [x, y, z] = box_of(labels[n], volume).size;
+    largest = {std::max(largest.x, x), std::max(largest.y, y), std::max(largest.z, z)};
+  }
+  // A wall is in the surfaces of two labels.
+  return mesh::cavity_search_memory(
+      {.dims = largest,
+       .vertices = 2 * walls.vertices,
+       .schemes = kMostOthers,
+       .at_once = std::min<std::uint64_t>(searched.size(),
+                                          static_cast<std::uint64_t>(mesh::thread_count()))});
 }
 
 }  // namespace isomesh::jobs

@@ -1,6 +1,7 @@
 // Notes on walls that are too thin for the lattice; private to this folder.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "server/jobs/making/make_mesh.h"
 #include "server/jobs/making/sample_array.h"
 #include "server/mesh/context.h"
+#include "server/mesh/extract/extract.h"
 #include "server/mesh/labels/label_voxels.h"
 
 namespace isomesh::jobs {
@@ -25,5 +27,16 @@ std::vector<Note> notes_on_thin_walls(const SampleArray& samples,
                                       std::span<const mesh::LabelVoxels> labels,
                                       const MeshParameters& parameters,
                                       const mesh::Context& context);
+
+// True if a job at an iso-value looks for cavities. Throws Error kCancelled.
+bool searches_cavities(const SampleArray& samples, const MeshParameters& parameters,
+                       const mesh::Context& context);
+
+// An upper estimate of the memory of that search, in bytes, for a surface of that size; and of the
+// search in a job by labels, whose walls have that size.
+std::uint64_t cavity_search_memory(const SampleArray& samples, const mesh::SurfaceSize& surface);
+std::uint64_t cavity_search_memory(const SampleArray& samples,
+                                   std::span<const mesh::LabelVoxels> labels,
+                                   const mesh::SurfaceSize& walls);
 
 }  // namespace isomesh::jobs

@@ -11,6 +11,7 @@
 #include "server/jobs/making/memory.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/mesh_stages.h"
+#include "server/jobs/making/thin_walls.h"
 #include "server/mesh/extract/windows.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/topology/window_topology.h"
@@ -94,6 +95,7 @@ std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequ
   return with_sample(samples.type, [&](auto sample) -> std::optional<MeshSummary> {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const std::uint64_t count = lattice.dims.samples();
+    const bool is_searched = searches_cavities(samples, parameters, progress.quiet());
     const bool is_large = can_be_walked(parameters, request.measures) && sets_aside(count);
     mesh::Spool* const spool = is_large ? request.spool : nullptr;
     Files files;
@@ -102,7 +104,8 @@ std::optional<MeshSummary> walk_stage(const SampleArray& samples, const MeshRequ
       const mesh::Context extracting = progress.context();
       mesh::SurfaceWindows windows(lattice, options, extracting.part(0, kCounting), spool);
       const mesh::SurfaceSize surface = size_of(windows.count());
-      check_memory(surface, count, request);
+      const std::uint64_t searching = is_searched ? cavity_search_memory(samples, surface) : 0;
+      check_memory(surface, count, request, {.searching_bytes = searching});
       if (!is_walked(surface, parameters, request.measures)) {
         windows.write_whole(extracting.part(kCounting, 1), mesh);
         return std::nullopt;

@@ -35,14 +35,17 @@ SurfaceSize surface_in_files(const MeshSummary& mesh) {
   return surface_in_files(counted);
 }
 
-// A key of what determines the surface of a volume besides iso-value, scheme and whether it is
-// closed.
+// A key of what determines the surface of a volume, and whether cavities are searched in it,
+// besides iso-value, scheme and whether it is closed.
 std::string key_of_part(const MeshParameters& parameters) {
   MeshParameters part;
   part.regularize = is_regularized(parameters);
   part.inside = parameters.inside;
   const bool is_whole = !parameters.labels && !parameters.crop;
-  if (is_whole && !part.regularize && part.inside == Inside::kAbove) return {};
+  // Both have cavities searched.
+  part.fill_cavities = parameters.fill_cavities || !parameters.components.keeps_all();
+  const bool is_plain = !part.regularize && !part.fill_cavities;
+  if (is_whole && is_plain && part.inside == Inside::kAbove) return {};
   // The positions of crossings decide which of them are joined.
   if (part.regularize) part.interpolation = parameters.interpolation;
   part.crop = parameters.crop;
@@ -130,8 +133,9 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   const std::uint64_t samples = std::uint64_t{volume.dims[0]} * volume.dims[1] * volume.dims[2];
-  estimate.memory_bytes =
-      estimate_memory(surface, samples, parameters, parameters, counted.triangles_of_labels());
+  const MemoryUse use = {.of_labels = counted.triangles_of_labels(),
+                         .searching_bytes = counted.searching_bytes};
+  estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters, use);
   estimate.memory_bytes +=
       CroppedSamples::most_bytes(parameters, volume.geometry, volume.dims, volume.type);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;

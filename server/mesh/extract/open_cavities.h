@@ -82,6 +82,18 @@ struct CavityCount {
 CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes,
                            const Context& context);
 
+// What bounds the memory of searches.
+struct CavitySearches {
+  Dims dims;                   // of the largest
+  std::uint64_t vertices = 0;  // of the surfaces that are searched at once
+  std::size_t schemes = 1;
+  std::uint64_t at_once = 1;  // searches
+};
+
+// An upper estimate of the memory of `count_cavities` in bytes, with the present number of threads.
+// Two vertices of a surface, or the border, end each run, so a smooth surface has few.
+std::uint64_t cavity_search_memory(const CavitySearches& searches);
+
 // True if the samples have two values, as a mask has. A third value ends the search.
 template <class T>
 bool is_mask(const Lattice<T>& lattice, const Context& context);

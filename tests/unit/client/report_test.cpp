@@ -306,6 +306,8 @@ TEST(WithOptions, NamesTheOptionInsteadOfTheParameter) {
             "If it holds raw samples, give their --dims X,Y,Z and --type.");
   EXPECT_EQ(with_options("no boundary in the box of crop; close adds the border"),
             "no boundary in the box of --crop; --close adds the border");
+  EXPECT_EQ(with_options("smoothing=taubin keeps it; regularize=false changes less."),
+            "--smoothing taubin keeps it; --no-regularize changes less.");
   EXPECT_EQ(with_options("as it is"), "as it is");
 }
 

@@ -159,6 +159,27 @@ TEST_F(EstimateTest, OfFewerTrianglesSaysAboutHowMany) {
   EXPECT_GT(few.memory_bytes, all.memory_bytes);
 }
 
+// Three values are no mask, so only some jobs look for cavities.
+TEST_F(EstimateTest, HasTheSearchForCavitiesOfJobsThatMakeIt) {
+  const Volume volume =
+      add(test::noise<std::uint8_t>({0, 1, 2}, {40, 40, 40}, 3), SampleType::kUint8);
+  JobParameters parameters = parameters_of(volume, 1);
+  parameters.passes = 0;
+  parameters.formats = {MeshFormat::kStl};
+  const Estimate without = estimator_.estimate("", parameters);
+  parameters.components.keep = 1;
+  const Estimate with = estimator_.estimate("", parameters);
+  EXPECT_EQ(with.vertices, without.vertices);
+  EXPECT_GT(with.memory_bytes, without.memory_bytes + 40 * with.vertices);
+  const Volume mask = add(test::noise<std::uint8_t>({0, 1}, {40, 40, 40}, 3), SampleType::kUint8);
+  parameters = parameters_of(mask, 1);
+  parameters.passes = 0;
+  parameters.formats = {MeshFormat::kStl};
+  const Estimate of_mask = estimator_.estimate("", parameters);
+  parameters.components.keep = 1;
+  EXPECT_EQ(estimator_.estimate("", parameters).memory_bytes, of_mask.memory_bytes);
+}
+
 TEST_F(EstimateTest, OtsuIsTheVolumesOwn) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);

@@ -270,13 +270,15 @@ TEST(JobMessage, ArrivesAsItWasSent) {
 TEST(JobMessage, ACountComesAsItWent) {
   CountedSurface counted = {
       .size = {.triangles = 1, .vertices = 2, .layers = 3, .largest_runs = {1, 2}},
-      .labels = {{.label = -5, .triangles = 6}}};
+      .labels = {{.label = -5, .triangles = 6}},
+      .searching_bytes = 7};
   const auto again = std::get<CountedSurface>(answer_from(to_line(counted)));
   EXPECT_EQ(again.size.triangles, 1U);
   EXPECT_EQ(again.size.vertices, 2U);
   EXPECT_EQ(again.size.layers, 3U);
   EXPECT_EQ(again.size.largest_runs, counted.size.largest_runs);
   EXPECT_EQ(again.labels, counted.labels);
+  EXPECT_EQ(again.searching_bytes, 7U);
   const JobProgress progress = {
       .stage = Stage::kSmooth, .share = 0.25, .timing = {.load = 1, .extract = 2}};
   const auto told = std::get<JobProgress>(answer_from(to_line(progress)));

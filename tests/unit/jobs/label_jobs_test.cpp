@@ -304,8 +304,8 @@ TEST_F(LabelJobsTest, ThatOverlapTakeTheMemoryOfAllTheirSurfaces) {
   const mesh::SurfaceSize walls = {.triangles = 1'000'000, .vertices = 500'000};
   const JobParameters parameters = label_parameters({});
   const std::uint64_t usual = estimate_memory(walls, 0, parameters, {});
-  EXPECT_EQ(estimate_memory(walls, 0, parameters, {}, 2 * walls.triangles), usual);
-  EXPECT_GT(estimate_memory(walls, 0, parameters, {}, 60 * walls.triangles),
+  EXPECT_EQ(estimate_memory(walls, 0, parameters, {}, {.of_labels = 2 * walls.triangles}), usual);
+  EXPECT_GT(estimate_memory(walls, 0, parameters, {}, {.of_labels = 60 * walls.triangles}),
             58 * walls.triangles * (sizeof(mesh::Triangle) + sizeof(mesh::Vec3) / 2));
 
   Volume volume = add_labels();

@@ -2,7 +2,9 @@
 #include "server/jobs/library/label_pages.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -162,45 +164,99 @@ TEST_F(LabelPagesTest, WallsWithoutFacesAreReadToo) {
   EXPECT_EQ(walls_of(job, 0, false, blobs_).walls, std::vector{wall});
 }
 
-TEST_F(LabelPagesTest, WallsTellTheirLabels) {
-  Job job = job_with(file_of(some_labels(600)), 600);
-  job.parameters.labels.emplace();
-  // Every third is between labels that share no face.
-  job.mesh->walls_count = 300;
-  job.mesh->edge_contacts_count = 150;
+// Every third is between labels that share no face.
+std::vector<mesh::WallArea> some_walls() {
   std::vector<mesh::WallArea> walls(450);
   for (std::size_t n = 0; n < walls.size(); ++n) {
     walls[n] = {n + 1, n % 2 == 0 ? 0U : 600U, static_cast<double>(n) / 4, n % 3};
   }
-  const auto keep = [&](std::string file) {
-    const store::Blob blob = test::put(blobs_, file);
-    job.mesh->wall_list = {blob.bytes, blob.key};
-  };
+  return walls;
+}
+
+std::string file_of(std::span<const mesh::WallArea> walls) {
   std::string file;
   write_walls(walls, [&](std::span<const std::byte> bytes) {
     file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   });
+  return file;
+}
+
+class WallPagesTest : public LabelPagesTest {
+ protected:
+  void keep(const std::string& file) {
+    const store::Blob blob = test::put(blobs_, file);
+    job_.mesh->wall_list = {blob.bytes, blob.key};
+  }
+
+  // Their first labels, from all pages.
+  std::vector<std::int64_t> all_walls(bool edge_contacts) {
+    std::vector<std::int64_t> labels;
+    for (std::optional<std::uint64_t> at = 0; at;) {
+      const WallPage page = walls_of(job_, *at, edge_contacts, blobs_);
+      for (const WallSummary& wall : page.walls) labels.push_back(wall.a);
+      at = page.next;
+    }
+    return labels;
+  }
+
+  void SetUp() override {
+    job_.parameters.labels.emplace();
+    job_.mesh->walls_count = 300;
+    job_.mesh->edge_contacts_count = 150;
+  }
+
+  Job job_ = job_with(file_of(some_labels(600)), 600);
+};
+
+// Every wall that is read is checked.
+TEST_F(WallPagesTest, ReadEdgeContactsOnlyIfAskedFor) {
+  constexpr std::size_t kWallBytes = 32;
+  std::string file = file_of(some_walls());
+  keep(file);
+  EXPECT_EQ(all_walls(true).size(), 450U);
+  for (std::size_t at = 300 * kWallBytes; at < file.size(); at += kWallBytes) {
+    std::fill_n(&file[at + 8], 8, '\x7f');  // no such label
+  }
+  keep(file);
+  EXPECT_EQ(all_walls(false).size(), 300U);
+  EXPECT_EQ(code_thrown_by([&] { all_walls(true); }), ErrorCode::kInternal);
+}
+
+// Older servers wrote walls and edge contacts in one order.
+TEST_F(WallPagesTest, AreTheSameFromAnOlderFile) {
+  const std::vector<mesh::WallArea> walls = some_walls();
+  keep(file_of(walls));
+  const auto expected = all_walls(false);
+  std::string older;
+  for (const mesh::WallArea& wall : walls) older += file_of(std::span(&wall, 1));
+  keep(older);
+  EXPECT_EQ(all_walls(false), expected);
+  EXPECT_EQ(all_walls(true).size(), walls.size());
+}
+
+TEST_F(WallPagesTest, TellTheirLabels) {
+  const std::string file = file_of(some_walls());
   keep(file);
   const auto expect_page = [&](std::uint64_t begin, bool edge_contacts, std::size_t count,
                                std::optional<std::uint64_t> next) {
-    const WallPage page = walls_of(job, begin, edge_contacts, blobs_);
+    const WallPage page = walls_of(job_, begin, edge_contacts, blobs_);
     EXPECT_EQ(page.walls.size(), count);
     EXPECT_EQ(page.next, next);
     const bool has_any = std::ranges::count(page.walls, 0U, &WallSummary::faces) > 0;
-    EXPECT_EQ(has_any, edge_contacts && count > 0);
+    EXPECT_EQ(has_any, edge_contacts && count > 0 && begin + count > 300);
   };
-  expect_page(0, false, 256, 385);
-  expect_page(385, false, 44, std::nullopt);
+  expect_page(0, false, 256, 256);
+  expect_page(256, false, 44, std::nullopt);
   expect_page(450, false, 0, std::nullopt);
   expect_page(0, true, 256, 256);
   expect_page(256, true, 194, std::nullopt);
   expect_page(450, true, 0, std::nullopt);
-  const auto both = walls_of(job, 448, false, blobs_).walls;
+  const auto both = walls_of(job_, 298, false, blobs_).walls;
   const WallSummary alone = {-300 + 3 * 448, std::nullopt, 112, 1, "label 448", std::nullopt};
   const WallSummary last = {-300 + 3 * 449, -300 + 3 * 599, 112.25, 2, "label 449", "label 599"};
   EXPECT_EQ(both, (std::vector{alone, last}));
 
-  const auto code = [&] { return code_thrown_by([&] { walls_of(job, 0, true, blobs_); }); };
+  const auto code = [&] { return code_thrown_by([&] { walls_of(job_, 0, true, blobs_); }); };
   keep(file.substr(1));
   EXPECT_EQ(code(), ErrorCode::kInternal);
   for (const auto& [at, byte] : {std::pair(0, 0), {1, 0x7f}, {9, 0x7f}, {22, 0xff}}) {
@@ -210,10 +266,10 @@ TEST_F(LabelPagesTest, WallsTellTheirLabels) {
     keep(damaged);
     EXPECT_EQ(code(), ErrorCode::kInternal) << at;
   }
-  job.mesh->walls_count.reset();
-  job.mesh->wall_list.reset();
+  job_.mesh->walls_count.reset();
+  job_.mesh->wall_list.reset();
   EXPECT_EQ(code(), ErrorCode::kNotFound);
-  job.parameters.labels.reset();
+  job_.parameters.labels.reset();
   EXPECT_FALSE(code());
 }
 

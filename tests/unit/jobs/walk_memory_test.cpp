@@ -93,8 +93,8 @@ Memory memory_of(const std::vector<std::uint8_t>& samples, const MeshParameters&
   const mesh::SurfaceSize surface = count_surface(array, request, {}).size;
   EXPECT_TRUE(sets_aside(samples.size()));
   EXPECT_EQ(is_walked(surface, parameters, {}), parameters.formats.front() != MeshFormat::kPly);
-  Memory memory = {.estimated =
-                       estimate_memory(surface, samples.size(), parameters, {}, 0, has_spool)};
+  Memory memory = {.estimated = estimate_memory(surface, samples.size(), parameters, {},
+                                                {.has_spool = has_spool})};
   Peak peak;
   WatchedSpool spool(folder.path(), peak);
   if (has_spool) request.spool = &spool;
@@ -154,6 +154,49 @@ TEST(EstimateMemory, OfAJobWithoutASpoolHasWhatItKeeps) {
 // The crossings are joined beside the whole surface.
 TEST(EstimateMemory, IsCloseToWhatAPlyTakes) { expect_close(parameters_for(MeshFormat::kPly, 0)); }
 
+// A mask with so many cavities that the search for them takes more than all else.
+TEST(EstimateMemory, HasTheSearchForCavities) {
+  const test::ThreadCount two(2);
+  constexpr std::uint32_t kShort = 32;
+  constexpr std::uint32_t kMany = 8000;
+  std::vector<std::uint8_t> samples(std::size_t{kMany} * kShort * kShort, 255);
+  for (std::size_t n = 0; n < samples.size(); ++n) {
+    const std::size_t all_odd = n & n / kShort & n / kShort / kShort & 1;
+    if (all_odd != 0) samples[n] = 0;
+  }
+  const SampleArray array = {SampleType::kUint8,
+                             {kShort, kShort, kMany},
+                             {},
+                             reinterpret_cast<const std::byte*>(samples.data())};
+  MeshParameters parameters = parameters_for(MeshFormat::kStl, 0);
+  parameters.regularize = false;
+  const Volume volume;
+  const test::TemporaryFolder folder;
+  SpoolFile spool(folder.path());
+  const MeshRequest request = {.volume = volume,
+                               .parameters = parameters,
+                               .iso = 128,
+                               .measures = {},
+                               .memory_bytes = std::uint64_t{1} << 40,
+                               .spool = &spool};
+  const CountedSurface counted = count_surface(array, request, {});
+  ASSERT_TRUE(is_walked(counted.size, parameters, {}));
+  const Report nobody = [](Stage /*stage*/, double /*share*/, const Timing& /*timing*/) {};
+  Progress progress({}, nobody, {});
+  const std::vector<codec::Sink> sinks = {[](std::span<const std::byte> /*bytes*/) {}};
+  mesh::Mesh mesh;
+  test::HeapPeak peak;
+  make_mesh(array, request, sinks, progress, mesh);
+  const std::uint64_t taken = peak.bytes();
+  const auto estimated = [&](std::uint64_t searching) {
+    return estimate_memory(counted.size, samples.size(), parameters, {},
+                           {.searching_bytes = searching});
+  };
+  EXPECT_LT(estimated(0), taken);
+  EXPECT_GE(estimated(counted.searching_bytes), taken);
+  EXPECT_LE(estimated(counted.searching_bytes), 3 * taken);
+}
+
 // Two large slices with a little surface between them, which is written with the indices of whole
 // planes of samples.
 Memory memory_of_slices(std::uint32_t side, const MeshParameters& parameters) {
@@ -167,8 +210,9 @@ Memory memory_of_slices(std::uint32_t side, const MeshParameters& parameters) {
                                .iso = 128,
                                .measures = {},
                                .memory_bytes = std::uint64_t{1} << 40};
-  const mesh::SurfaceSize surface = parameters.labels ? count_labels(array, parameters, {}).size
-                                                      : count_surface(array, request, {}).size;
+  const CountedSurface counted =
+      parameters.labels ? count_labels(array, parameters, {}) : count_surface(array, request, {});
+  const mesh::SurfaceSize& surface = counted.size;
   EXPECT_FALSE(is_walked(surface, parameters, {}));
   const Report nobody = [](Stage /*stage*/, double /*share*/, const Timing& /*timing*/) {};
   Progress progress({}, nobody, {});
@@ -181,7 +225,8 @@ Memory memory_of_slices(std::uint32_t side, const MeshParameters& parameters) {
   } else {
     make_mesh(array, request, sinks, progress, mesh);
   }
-  return {.estimated = estimate_memory(surface, samples.size(), parameters, {}),
+  return {.estimated = estimate_memory(surface, samples.size(), parameters, {},
+                                       {.searching_bytes = counted.searching_bytes}),
           .counted = peak.bytes()};
 }
 

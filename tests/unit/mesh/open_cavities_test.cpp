@@ -425,6 +425,25 @@ TEST(OpenCavities, AreNotCountedBetweenTooManyRunsSoThatMemoryIsBounded) {
   EXPECT_LE(peak.bytes(), 2 * kMostRunBytes);
 }
 
+TEST(OpenCavities, TakeNoMoreMemoryThanIsEstimated) {
+  const test::ThreadCount threads(2);
+  const auto expect_enough = [](const test::SampleVolume<std::uint8_t>& volume) {
+    const Lattice<std::uint8_t> lattice = volume.lattice();
+    const ExtractOptions options = {.iso = kIso, .regularize = true};
+    const std::uint64_t vertices = count_surface(lattice, options, {}).vertices();
+    test::HeapPeak peak;
+    count_cavities(sign_rows(lattice, options), test::kSchemes, {});
+    const std::uint64_t estimated = cavity_search_memory(
+        {.dims = lattice.dims, .vertices = vertices, .schemes = test::kSchemes.size()});
+    EXPECT_GE(estimated, peak.bytes());
+    return estimated;
+  };
+  expect_enough(test::noise<std::uint8_t>({0, 1}, {100, 110, 130}, 7));
+  expect_enough(test::noise<std::uint8_t>({0, 1, 1, 1, 1}, {130, 100, 110}, 8));
+  expect_enough(test::noise<std::uint8_t>({0, 0, 1}, {600, 500, 2}, 9));
+  EXPECT_LT(expect_enough(shell(1.5, kOffCentre)), std::uint64_t{1} << 20);
+}
+
 TEST(OpenCavities, StopWhenTheyAreCancelled) {
   std::stop_source stop;
   stop.request_stop();

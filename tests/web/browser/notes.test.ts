@@ -1,7 +1,7 @@
 // What the daemon says about an upload, and what a person may answer.
 import { describe, expect } from 'vitest';
 import { ctSlice, samples, seriesNifti, smallNrrd, twoFormNifti } from './files';
-import { drop, keepNotices, setup } from './support';
+import { ballNrrd, cubeNrrd, drop, keepNotices, madeJob, noted, setup } from './support';
 
 const { at, it } = setup();
 
@@ -241,5 +241,42 @@ describe('iso-values with names', () => {
     await expect.poll(() => page.locator('.iso-input').inputValue()).toBe('612');
     await presets.getByRole('button', { name: 'Remove the preset cage' }).click();
     await expect.poll(() => presets.getByRole('button', { name: 'cage 612' }).count()).toBe(0);
+  });
+});
+
+// From an upload to the page of its job, at that iso-value.
+async function makeOf(name: string, bytes: Buffer, iso: number): Promise<void> {
+  const { daemon, page } = at;
+  await page.goto(daemon.url);
+  await drop(page, [{ name, bytes }]);
+  await page.waitForURL(volumePage);
+  await page.getByLabel('Iso-value', { exact: true }).nth(0).fill(String(iso));
+  await expect.poll(() => noted(page, 'iso')).toBe(String(iso));
+  await page.getByRole('button', { name: 'Make the surface' }).click();
+  await page.waitForURL(/#\/jobs\//);
+  await madeJob(at);
+}
+
+describe('what a job found', () => {
+  it('is why its surface is empty, and what is not', async ({ page }) => {
+    await makeOf('ball.nrrd', ballNrrd(20, 7, 4), 251);
+    const overlay = page.locator('.overlay.message');
+    await expect.poll(() => overlay.innerText()).toMatch(/The surface is empty: the iso-value 251 .*; its suggested iso-value is \d/);
+    const [, suggested = ''] = /suggested iso-value is (\d+(\.\d+)?)/.exec(await overlay.innerText()) ?? [];
+    await overlay.getByRole('link', { name: 'Change parameters' }).click();
+    await page.waitForURL(volumePage);
+    await page.getByLabel('Iso-value', { exact: true }).nth(0).fill(suggested);
+    await expect.poll(() => noted(page, 'iso')).toBe(suggested);
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.waitForURL(/#\/jobs\//);
+    expect((await madeJob(at)).mesh?.triangles).toBeGreaterThan(0);
+  });
+
+  it('is a cavity that a thin wall leaves open, and how much smoothing took of the wall', async ({ page }) => {
+    const wall = cubeNrrd(30, (x, y, z) => (Math.abs(Math.hypot(x - 14.6, y - 14.3, z - 14.8) - 11) < 0.75 ? 200 : 7));
+    await makeOf('wall.nrrd', wall, 100);
+    const numbers = page.getByLabel('Job', { exact: true });
+    await expect.poll(() => numbers.innerText()).toMatch(/Notes\s+1 cavity of \d+ voxels .* scheme=5 closes it\./);
+    expect(await numbers.innerText()).toMatch(/Smoothing made the volume [\d.]+ % smaller .* smoothing=taubin keeps the volume/);
   });
 });

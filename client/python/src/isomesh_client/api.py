@@ -108,7 +108,7 @@ class Note(TypedDict):
 #: The format of an upload.
 VolumeFormat = Literal['nifti', 'nrrd', 'metaimage', 'vti', 'vtk', 'mgh', 'afni', 'par', 'isq', 'mrc', 'cube', 'numpy', 'gipl', 'mif', 'zarr', 'hdf5', 'tiff', 'png', 'bmp', 'dicom', 'raw']
 #: A stable name, for programs.
-NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'unit-angstrom', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'contours-skipped', 'contours-interpolated', 'fractional-segments', 'padding', 'duplicate-slice', 'directions-corrected', 'positions-rounded', 'frames-as-slices', 'header-corrected', 'rescale-ignored', 'labels-rounded', 'labels-renumbered', 'chunks-missing', 'orientation-changed', 'thin-walls']
+NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'unit-angstrom', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'contours-skipped', 'contours-interpolated', 'fractional-segments', 'padding', 'duplicate-slice', 'directions-corrected', 'positions-rounded', 'frames-as-slices', 'header-corrected', 'rescale-ignored', 'labels-rounded', 'labels-renumbered', 'chunks-missing', 'orientation-changed', 'thin-walls', 'volume-changed']
 #: A reason to reject a volume, unless the query accepts it.
 AcceptableNote = Literal['space-assumed', 'frame-of-reference', 'distance-assumed', 'padding', 'duplicate-slice', 'directions-corrected', 'positions-rounded', 'frames-as-slices']
 
