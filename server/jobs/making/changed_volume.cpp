@@ -10,7 +10,7 @@
 namespace isomesh::jobs {
 namespace {
 
-constexpr double kToldFrom = 0.01;  // of the extracted volume
+constexpr double kToldFrom = 0.05;  // of the extracted volume
 
 // In percent, with one place.
 std::string percent(double share) {
