@@ -1,6 +1,7 @@
 #include "base/log.h"
 
 #include <array>
+#include <atomic>
 #include <cstdio>
 #include <new>
 #include <string>
@@ -17,9 +18,8 @@ using Json = nlohmann::ordered_json;
 constexpr std::array<const char*, 5> kLevelNames = {"debug", "info", "warning", "error",
                                                     "critical"};
 
-// Constant once start_log has returned.
-LogFormat chosen_format = LogFormat::kText;
-LogLevel lowest_level = LogLevel::kOff;
+std::atomic<LogFormat> chosen_format = LogFormat::kText;
+std::atomic<LogLevel> lowest_level = LogLevel::kOff;
 
 std::string quoted(std::string_view text) {
   // Only ASCII: other characters can reverse or hide a line on a terminal.

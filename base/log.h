@@ -23,7 +23,8 @@ namespace isomesh {
 enum class LogFormat { kText, kJson };
 enum class LogLevel { kDebug, kInfo, kWarn, kError, kCritical, kOff };
 
-// Call before threads start. Nothing is written before.
+// Nothing is written before. Thread safe: a line that another thread is writing may be in either
+// format, and is lost if it was begun before.
 void start_log(LogFormat format, LogLevel level);
 
 // One line, written by the destructor; lost if memory is exhausted. Not thread safe, but lines of
