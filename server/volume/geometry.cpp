@@ -157,56 +157,50 @@ void keep_largest(std::vector<Candidate>& candidates, const Value& value) {
                 [&](const Candidate& each) { return value(each) < largest - kEqualCosines; });
 }
 
-// The nearest power of ten. Its borders are at roots, because spacings are often powers.
-int decade(double value) { return static_cast<int>(std::lround(std::log10(value))); }
+// A step of a decimal grid: 1, 2 or 5 units of the last of so many decimals. A negative number of
+// decimals is one of zeros.
+struct GridStep {
+  double units = 1;
+  int decimals = 0;
+};
 
-// Rounds to so many decimals; a negative number of them is one of zeros. Numbers halfway between
-// two are common, and an error of rounding must not decide them. So the border is not halfway.
-double rounded(double value, int decimals) {
-  constexpr double kBorder = 0.4876543;
-  const double scale = std::pow(10.0, std::abs(decimals));
-  const double size = std::abs(value);
-  const double count = std::floor((decimals < 0 ? size / scale : size * scale) + kBorder);
-  if (count >= 0x1p53) return value;  // coarser than the decimals
-  return std::copysign(decimals < 0 ? count * scale : count / scale, value);
+// The largest such step up to `most`, which may be above it by an error of rounding.
+GridStep step_up_to(double most) {
+  const double limit = most * (1 + 1e-9);
+  const int decade = static_cast<int>(std::floor(std::log10(limit)));
+  const double units =
+      decade < 0 ? limit * std::pow(10.0, -decade) : limit / std::pow(10.0, decade);
+  return {units >= 5 ? 5.0 : units >= 2 ? 2.0 : 1.0, -decade};
 }
+
+// The nearest number of the grid. Numbers halfway between two are common, and an error of rounding
+// must not decide them. So the border is not halfway.
+double rounded(double value, const GridStep& step) {
+  constexpr double kBorder = 0.4876543;
+  const double scale = std::pow(10.0, std::abs(step.decimals));
+  const double size = std::abs(value);
+  const double scaled = (step.decimals < 0 ? size / scale : size * scale) / step.units;
+  const double count = std::floor(scaled + kBorder) * step.units;
+  if (count >= 0x1p53) return value;  // coarser than the grid
+  return std::copysign(step.decimals < 0 ? count * scale : count / scale, value);
+}
+
+// The grids of a geometry (canonical_geometry). The borders between two steps are on both grids. So
+// a number near a border becomes the same on either, and a rounded number stays as it is.
+constexpr double kSpacingStep = 5.0 / 7 * 1e-6;  // of the spacing
+constexpr GridStep kCosineStep = {2, 7};
+constexpr double kPlaceStep = 2e-4;  // of the smallest spacing
 
 double settled_spacing(double spacing) {
-  const double fine = rounded(spacing, 12 - decade(spacing));
-  const double coarse = rounded(fine, 5 - decade(spacing));
-  return std::abs(fine - coarse) <= fine * 0x1p-24 ? coarse : fine;
-}
-
-double settled_cosine(double cosine) {
-  constexpr double kNear = 1e-7;
-  if (std::abs(cosine - std::round(cosine)) <= kNear) return std::round(cosine);
-  return rounded(cosine, 10);
+  return rounded(spacing, step_up_to(spacing * kSpacingStep));
 }
 
 std::array<double, 9> settled_direction(const Geometry& geometry) {
   std::array<double, 9> settled = {};
-  std::ranges::transform(geometry.direction, settled.begin(), settled_cosine);
+  std::ranges::transform(geometry.direction, settled.begin(),
+                         [](double cosine) { return rounded(cosine, kCosineStep); });
   return settled;
 }
-
-// Rounds a place to numbers as people choose them, if single precision may be all that is between.
-class PlaceGrid {
- public:
-  PlaceGrid(double smallest_spacing, double largest_coordinate)
-      : decade_(decade(smallest_spacing)),
-        near_(std::max(smallest_spacing * 0x1p-15,
-                       std::min(largest_coordinate * 0x1p-23, std::pow(10.0, decade_ - 3) / 8))) {}
-
-  double nearest(double place) const {
-    const double fine = rounded(place, 7 - decade_);
-    const double coarse = rounded(fine, 3 - decade_);
-    return std::abs(fine - coarse) <= near_ ? coarse : fine;
-  }
-
- private:
-  int decade_;
-  double near_;
-};
 
 // The way from the first sample of a lattice to its middle.
 Vector3 way_to_middle(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry) {
@@ -384,9 +378,8 @@ Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geom
   for (std::size_t row = 0; row < 3; ++row) {
     result.origin[row] = geometry.origin[row] + before[row] - after[row];
   }
-  const PlaceGrid grid(std::ranges::min(result.spacing),
-                       largest_coordinate(in_order(dims, order), result));
-  for (double& place : result.origin) place = grid.nearest(place);
+  const GridStep step = step_up_to(std::ranges::min(result.spacing) * kPlaceStep);
+  for (double& place : result.origin) place = rounded(place, step);
   return normalised(result);
 }
 

@@ -73,16 +73,16 @@ Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geom
                   const AxisOrder& order);
 
 // The lattice in the canonical order of axes, with numbers that do not depend on the sample from
-// which a file counts. Both ends of a mirrored axis are rounded in their own way, in single or in
-// double precision. The middle of the lattice stays where it is, and
-//   - a spacing is rounded to 12 digits, and to 5 or 6 if that is within single precision (2^-24);
-//   - a cosine within 1e-7 of -1, 0 or 1 becomes that, and others are rounded to 10 decimals;
-//   - a number of the origin is rounded to 1e-7 of the power of ten that is nearest to the smallest
-//     spacing, and to 1e-3 of it if that is within single precision: 2^-23 of the largest
-//     coordinate, but at most 1/8 of that step, and at least 2^-15 of the smallest spacing.
-// So a number as people choose it is the same after single precision, and any number after double
-// precision. Rounding moves a sample by at most about 3e-5 of the smallest spacing and 2^-23 of the
-// largest coordinate together, which is the precision of a mesh. The result of the result is
+// which a file counts, nor on the numbers with which it places the lattice: each file rounds them
+// in its own way, often to single precision. A number becomes the nearest of a grid, whose step is
+// 1, 2 or 5 times a power of ten:
+//   - of a spacing, the largest up to 7.1e-7 of it;
+//   - of a cosine, 2e-7;
+//   - of a coordinate of the origin, the largest up to 2e-4 of the smallest spacing.
+// The first two leave the middle of the lattice where it is. So numbers as people choose them stay
+// or are found again, and others are equal unless a border of a grid lies between them. Rounding
+// moves the lattice by at most 1e-4 of the smallest spacing along each axis of the patient, and a
+// sample by at most 5e-7 of its way along the axes from the middle. The result of the result is
 // itself. The geometry must be normalised and free of faults (find_fault).
 Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry);
 

@@ -32,7 +32,16 @@ void check(const std::stop_token& stop) {
 
 template <class Sample>
 void copy_reversed(const Sample* from, std::size_t count, Sample* to) {
-  for (std::size_t at = 0; at < count; ++at) to[at] = from[count - 1 - at];
+  std::size_t at = 0;
+  if constexpr (sizeof(Sample) == 1) {  // eight at once; the compiler finds no vectors for bytes
+    for (; at + sizeof(std::uint64_t) <= count; at += sizeof(std::uint64_t)) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, from + count - sizeof(eight) - at, sizeof(eight));
+      eight = __builtin_bswap64(eight);
+      std::memcpy(to + at, &eight, sizeof(eight));
+    }
+  }
+  for (; at < count; ++at) to[at] = from[count - 1 - at];
 }
 
 // Exchanges the axes of a matrix whose elements are `unit` samples, in place.

@@ -37,8 +37,9 @@ constexpr std::array<Order, 6> kOrders = {{{"LPS", {1, 2, 3}},
                                            {"SPL", {3, 2, 1}}}};
 
 // Waves with noise, which gzip compresses about as well as a scan.
-std::vector<std::int16_t> scan() {
-  std::vector<std::int16_t> samples;
+template <class Sample>
+std::vector<Sample> scan() {
+  std::vector<Sample> samples;
   samples.reserve(std::size_t{kDims[0]} * kDims[1] * kDims[2]);
   std::uint32_t noise = 1;
   for (std::uint32_t z = 0; z < kDims[2]; ++z) {
@@ -47,7 +48,8 @@ std::vector<std::int16_t> scan() {
         noise = noise * 1664525U + 1013904223U;
         const double wave =
             900 * std::sin(x * 0.05) * std::cos(y * 0.03) + 500 * std::sin(z * 0.06);
-        samples.push_back(static_cast<std::int16_t>(wave + (noise >> 27)));
+        samples.push_back(
+            static_cast<Sample>(static_cast<int>(wave) + static_cast<int>(noise >> 27)));
       }
     }
   }
@@ -59,7 +61,8 @@ void put(std::string& header, std::size_t at, Number number) {
   header.replace(at, sizeof number, reinterpret_cast<const char*>(&number), sizeof number);
 }
 
-std::string nifti(const Dims& dims, const Geometry& geometry, std::string_view samples) {
+std::string nifti(const Dims& dims, const Geometry& geometry, std::size_t bytes_per_sample,
+                  std::string_view samples) {
   constexpr std::size_t kHeaderBytes = 352;
   std::string file(kHeaderBytes, '\0');
   put(file, 0, std::int32_t{348});
@@ -68,8 +71,8 @@ std::string nifti(const Dims& dims, const Geometry& geometry, std::string_view s
     put(file, 42 + axis * 2, static_cast<std::int16_t>(dims[axis]));
     put(file, 80 + axis * 4, static_cast<float>(geometry.spacing[axis]));
   }
-  put(file, 70, std::int16_t{4});  // int16
-  put(file, 72, std::int16_t{16});
+  put(file, 70, static_cast<std::int16_t>(bytes_per_sample == 1 ? 2 : 4));  // uint8 or int16
+  put(file, 72, static_cast<std::int16_t>(8 * bytes_per_sample));
   put(file, 108, static_cast<float>(kHeaderBytes));
   file[123] = 2;                    // millimetres
   put(file, 254, std::int16_t{1});  // the matrix is in RAS
@@ -92,36 +95,44 @@ void import(const std::filesystem::path& file) {
       {.source = file, .scratch = scratch.path(), .target = scratch.path() / "canonical"});
 }
 
+template <class Sample>
 std::filesystem::path write(const test::TemporaryFolder& folder, const Order& order,
-                            std::vector<std::int16_t> samples, bool is_gzip) {
+                            std::vector<Sample> samples, bool is_gzip) {
   const auto bytes = std::as_writable_bytes(std::span(samples));
   const Geometry place = {.origin = {-110, -120, 30}, .spacing = {0.7, 0.7, 1}};
-  volume::put_in_order(bytes, sizeof(std::int16_t), kDims, order.axes);
+  volume::put_in_order(bytes, sizeof(Sample), kDims, order.axes);
   const std::string file =
       nifti(volume::in_order(kDims, order.axes), volume::in_order(kDims, place, order.axes),
-            {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+            sizeof(Sample), {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const std::filesystem::path path = folder / (std::string(order.name) + ".nii");
   test::write_file(path, is_gzip ? test::gzip(file) : file);
   return path;
 }
 
+template <class Sample>
+void measure(std::string_view type, bool is_gzip, Json& rows) {
+  const std::vector<Sample> samples = scan<Sample>();
+  const test::TemporaryFolder folder(test::fast_place());
+  const std::filesystem::path straight = write(folder, kOrders[0], samples, is_gzip);
+  for (const Order& order : kOrders) {
+    const std::filesystem::path file = write(folder, order, samples, is_gzip);
+    const Paired times = time_in_pairs({[&] { import(file); }}, {[&] { import(straight); }});
+    rows.push_back({{"axes", order.name},
+                    {"type", type},
+                    {"gzip", is_gzip},
+                    {"import_ms", times.ours_ms},
+                    {"lps_ms", times.peer_ms},
+                    {"ratio", times.ratio}});
+  }
+}
+
 }  // namespace
 
 Json measure_imports() {
-  const std::vector<std::int16_t> samples = scan();
   Json rows = Json::array();
   for (const bool is_gzip : {false, true}) {
-    const test::TemporaryFolder folder(test::fast_place());
-    const std::filesystem::path straight = write(folder, kOrders[0], samples, is_gzip);
-    for (const Order& order : kOrders) {
-      const std::filesystem::path file = write(folder, order, samples, is_gzip);
-      const Paired times = time_in_pairs({[&] { import(file); }}, {[&] { import(straight); }});
-      rows.push_back({{"axes", order.name},
-                      {"gzip", is_gzip},
-                      {"import_ms", times.ours_ms},
-                      {"lps_ms", times.peer_ms},
-                      {"ratio", times.ratio}});
-    }
+    measure<std::uint8_t>("uint8", is_gzip, rows);
+    measure<std::int16_t>("int16", is_gzip, rows);
   }
   return rows;
 }

@@ -47,6 +47,21 @@ std::uint32_t window_slices(const LabelGrid& grid) {
       std::clamp<std::size_t>(grid.window_bytes / slice, 1, grid.dims[2]));
 }
 
+template <class Sample>
+std::int64_t label_of(Sample value) {
+  if constexpr (std::is_floating_point_v<Sample>) {
+    return volume::is_nearly_whole(value) ? volume::whole_number(value) : 0;
+  } else {
+    return static_cast<std::int64_t>(value);
+  }
+}
+
+void read(const store::BlobReader& samples, std::uint64_t offset, std::span<std::byte> target) {
+  if (samples.read_at(volume::kHeaderBytes + offset, target) != target.size()) {
+    throw Error(ErrorCode::kInternal, "a stored label volume became shorter");
+  }
+}
+
 // Reads slices of the label volume as the images have them.
 class SliceReader {
  public:
@@ -96,9 +111,7 @@ class SliceReader {
     const std::size_t row_bytes = sample_bytes_ * stored_dims_[0];
     rows_.resize(row_bytes * (ranges[1].end - ranges[1].begin));
     const std::uint64_t first = std::uint64_t{z} * stored_dims_[1] + ranges[1].begin;
-    if (samples_->read_at(volume::kHeaderBytes + first * row_bytes, rows_) != rows_.size()) {
-      throw Error(ErrorCode::kInternal, "a stored label volume became shorter");
-    }
+    isomesh::orders::read(*samples_, first * row_bytes, rows_);
     with_sample(grid_.type, [&](auto sample) { put_rows<decltype(sample)>(ranges, z); });
   }
 
@@ -132,15 +145,6 @@ class SliceReader {
     }
   }
 
-  template <class Sample>
-  static std::int64_t label_of(Sample value) {
-    if constexpr (std::is_floating_point_v<Sample>) {
-      return volume::is_nearly_whole(value) ? volume::whole_number(value) : 0;
-    } else {
-      return static_cast<std::int64_t>(value);
-    }
-  }
-
   const LabelGrid& grid_;
   const std::unique_ptr<const store::BlobReader> samples_;
   const std::size_t sample_bytes_;
@@ -153,6 +157,49 @@ class SliceReader {
   std::uint32_t end_ = 0;
   std::vector<std::int64_t> labels_;
   std::optional<std::uint32_t> current_;
+};
+
+// The slices that have samples of each label.
+class Occurrences {
+ public:
+  Occurrences(std::span<const std::int64_t> labels, std::uint32_t slices)
+      : count_(slices), slices_(labels.size()) {
+    for (std::size_t place = 0; place < labels.size(); ++place) places_[labels[place]] = place;
+  }
+
+  // Throws Error kTooLarge for more than an object may have.
+  void add(std::int64_t label, std::uint32_t slice) {
+    if (label != last_) {
+      last_ = label;
+      const auto found = places_.find(label);
+      known_ = found == places_.end() ? nullptr : &slices_[found->second];
+      if (known_ != nullptr && known_->empty()) known_->resize(count_);
+    }
+    if (known_ == nullptr || (*known_)[slice]) return;
+    (*known_)[slice] = true;
+    dicom::check_frames(++frames_);
+  }
+
+  // By label, then by slice.
+  std::vector<dicom::SegmentationFrame> frames() const {
+    std::vector<dicom::SegmentationFrame> frames;
+    frames.reserve(frames_);
+    for (std::size_t place = 0; place < slices_.size(); ++place) {
+      for (std::uint32_t slice = 0; slice < slices_[place].size(); ++slice) {
+        if (!slices_[place][slice]) continue;
+        frames.push_back({.segment = static_cast<std::uint16_t>(place + 1), .slice = slice});
+      }
+    }
+    return frames;
+  }
+
+ private:
+  std::uint32_t count_;
+  std::map<std::int64_t, std::size_t> places_;
+  std::vector<std::vector<bool>> slices_;  // of each label; empty until it is found
+  std::size_t frames_ = 0;
+  std::optional<std::int64_t> last_;
+  std::vector<bool>* known_ = nullptr;  // the slices of the last label; null if it is not wanted
 };
 
 // The axis of the label volume that lies most along each axis of the images.
@@ -179,6 +226,40 @@ std::array<std::size_t, 3> axes_along(const Geometry& images, const Geometry& la
 
 void check(const std::stop_token& stop) {
   if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
+}
+
+void find_in_slices(const LabelGrid& grid, const store::BlobStore& blobs,
+                    const std::stop_token& stop, Occurrences& found) {
+  SliceReader reader(grid, blobs);
+  for (std::uint32_t slice = 0; slice < grid.dims[2]; ++slice) {
+    check(stop);
+    for (const std::int64_t label : reader.read(slice)) found.add(label, slice);
+  }
+}
+
+// Each row of the file has a sample of each slice. So the file is read once, and not once for each
+// window of slices.
+void find_across_rows(const LabelGrid& grid, const store::BlobStore& blobs,
+                      const std::stop_token& stop, Occurrences& found) {
+  constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
+  const auto samples = blobs.open(grid.samples);
+  const std::uint32_t slices = grid.dims[2];
+  const std::size_t row_bytes = bytes_per_sample(grid.type) * slices;
+  const std::uint64_t end = std::uint64_t{row_bytes} * grid.dims[0] * grid.dims[1];
+  std::vector<std::byte> piece(std::max<std::size_t>(kPieceBytes / row_bytes, 1) * row_bytes);
+  for (std::uint64_t begin = 0; begin < end; begin += piece.size()) {
+    check(stop);
+    piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), end - begin)));
+    read(*samples, begin, piece);
+    with_sample(grid.type, [&](auto sample) {
+      std::uint32_t slice = 0;
+      for (std::size_t at = 0; at < piece.size(); at += sizeof(sample)) {
+        std::memcpy(&sample, piece.data() + at, sizeof(sample));
+        found.add(label_of(sample), grid.is_flipped[2] ? slices - 1 - slice : slice);
+        if (++slice == slices) slice = 0;
+      }
+    });
+  }
 }
 
 }  // namespace
@@ -245,31 +326,13 @@ std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
                                                 std::span<const std::int64_t> labels,
                                                 const store::BlobStore& blobs,
                                                 const std::stop_token& stop) {
-  std::map<std::int64_t, std::size_t> places;
-  for (std::size_t place = 0; place < labels.size(); ++place) places[labels[place]] = place;
-  std::vector<std::vector<std::uint32_t>> slices(labels.size());
-  std::size_t count = 0;
-  SliceReader reader(grid, blobs);
-  for (std::uint32_t slice = 0; slice < grid.dims[2]; ++slice) {
-    check(stop);
-    std::optional<std::int64_t> last;
-    for (const std::int64_t label : reader.read(slice)) {
-      if (label == last) continue;
-      last = label;
-      const auto found = places.find(label);
-      if (found == places.end()) continue;
-      std::vector<std::uint32_t>& known = slices[found->second];
-      if (!known.empty() && known.back() == slice) continue;
-      known.push_back(slice);
-      dicom::check_frames(++count);
-    }
+  Occurrences found(labels, grid.dims[2]);
+  if (grid.axes[2] == 0) {
+    find_across_rows(grid, blobs, stop, found);
+  } else {
+    find_in_slices(grid, blobs, stop, found);
   }
-  std::vector<dicom::SegmentationFrame> frames;
-  for (std::size_t place = 0; place < labels.size(); ++place) {
-    for (const std::uint32_t slice : slices[place]) {
-      frames.push_back({.segment = static_cast<std::uint16_t>(place + 1), .slice = slice});
-    }
-  }
+  std::vector<dicom::SegmentationFrame> frames = found.frames();
   // Otherwise each segment would read all windows again, each of which may read the whole file.
   if (const std::uint32_t window = window_slices(grid); window > 1) {
     std::ranges::stable_sort(frames, {}, [&](const auto& frame) { return frame.slice / window; });

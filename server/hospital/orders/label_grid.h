@@ -48,9 +48,9 @@ LabelGrid label_grid(const Geometry& images, const std::array<std::uint32_t, 3>&
 
 // The slices where the segments have samples, by segment, then by slice. If slices lie across the
 // layers of the file, windows of them come one after another, so that write_frames reads each
-// window once. Takes the memory of a window (`window_bytes`, or one slice). `labels` are those of
-// the segments. Throws Error kCancelled, kTooLarge for more frames than an object may have, and
-// kInternal if the blob is damaged.
+// window once. Takes the memory of a window (`window_bytes`, or one slice), or a bit for each slice
+// of each label. `labels` are those of the segments. Throws Error kCancelled, kTooLarge for more
+// frames than an object may have, and kInternal if the blob is damaged.
 std::vector<dicom::SegmentationFrame> frames_of(const LabelGrid& grid,
                                                 std::span<const std::int64_t> labels,
                                                 const store::BlobStore& blobs,

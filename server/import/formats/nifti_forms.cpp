@@ -79,15 +79,19 @@ bool is_rotation(const NiftiHeader& header) {
   return squares_of(header) <= 1 + kRounding;
 }
 
-// The quaternion has length 1 and a nonnegative real part, which is therefore not stored.
+// The quaternion has length 1 and a nonnegative real part, which is therefore not stored. Near half
+// a turn, the rounding of the others is all that is left of its square, so it is 0 then, as in the
+// C library of NIfTI.
 Placement qform_of(const NiftiHeader& header, const Vector3& spacing) {
+  constexpr double kRounding = 1e-7;
   if (!is_rotation(header)) {
     throw_unusable("The quaternion of the NIfTI header's qform is not a rotation.");
   }
   auto [b, c, d] = header.quaternion;
   const double squares = squares_of(header);
-  const double a = std::sqrt(std::max(0.0, 1 - squares));
-  const double norm = std::sqrt(std::max(1.0, squares));
+  const bool is_half_turn = 1 - squares < kRounding;
+  const double a = is_half_turn ? 0 : std::sqrt(1 - squares);
+  const double norm = is_half_turn ? std::sqrt(squares) : 1;
   b /= norm;
   c /= norm;
   d /= norm;

@@ -1,7 +1,10 @@
 #include "server/import/samples/wide_labels.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -12,7 +15,7 @@
 #include "proto/samples.h"
 #include "server/import/labels/closed_ends.h"
 #include "server/volume/canonical.h"
-#include "server/volume/labels.h"
+#include "server/volume/geometry.h"
 
 namespace isomesh::import {
 namespace {
@@ -21,21 +24,25 @@ constexpr std::size_t kWidePieceSamples = std::size_t{1} << 16;
 // The smallest fraction of equal neighbours, not counting pairs of background, as of other labels.
 constexpr double kFlat = 0.6;
 
+// Reads as many samples as `piece` has, from the sample `first` on.
+template <class Stored>
+void read_piece(const PlainSamples& samples, std::uint64_t first, std::vector<Stored>& piece) {
+  const auto bytes = std::as_writable_bytes(std::span(piece));
+  if (samples.file.read(samples.offset + first * sizeof(Stored), bytes) != bytes.size()) {
+    throw_unusable("The file ends before its last sample.");
+  }
+  if (samples.layout.big_endian) swap_bytes(bytes, sizeof(Stored));
+}
+
 // Calls take(pieces of samples) from the first to the last, until it returns false.
 template <class Stored, class Take>
 void for_each_piece(const PlainSamples& samples, std::uint64_t count, const Take& take) {
   std::vector<Stored> piece;
-  std::uint64_t offset = samples.offset;
-  while (count > 0) {
-    piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(count, kWidePieceSamples)));
-    const auto bytes = std::as_writable_bytes(std::span(piece));
-    if (samples.file.read(offset, bytes) != bytes.size()) {
-      throw_unusable("The file ends before its last sample.");
-    }
-    if (samples.layout.big_endian) swap_bytes(bytes, sizeof(Stored));
+  for (std::uint64_t first = 0; first < count; first += piece.size()) {
+    piece.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(count - first, kWidePieceSamples)));
+    read_piece(samples, first, piece);
     if (!take(std::span<const Stored>(piece))) return;
-    offset += bytes.size();
-    count -= piece.size();
   }
 }
 
@@ -112,6 +119,45 @@ class Numbers {
   std::uint32_t number_ = 0;
 };
 
+// The share of neighbours that are equal along the patient's first axis, as
+// volume::share_of_equal_neighbours() counts them in the canonical file.
+template <class Stored>
+double share_of_equal(const PlainSamples& samples, const Volume& volume) {
+  const auto& dims = volume.dims;
+  const volume::AxisOrder order = volume::canonical_order(volume.geometry);
+  const std::array<std::uint64_t, 3> strides = {1, dims[0], std::uint64_t{dims[0]} * dims[1]};
+  std::uint64_t corner = 0;  // where the canonical file begins
+  for (const int axis : order) {
+    const auto at = static_cast<std::size_t>(std::abs(axis) - 1);
+    if (axis < 0) corner += strides.at(at) * (dims.at(at) - 1);
+  }
+  std::vector<Stored> piece(1);
+  read_piece(samples, corner, piece);
+  const Stored background = piece.front();
+  const auto along = static_cast<std::size_t>(std::abs(order[0]) - 1);
+  const std::uint64_t stride = strides.at(along);
+  const std::uint64_t line = stride * dims.at(along);
+  std::vector<Stored> before;
+  std::uint64_t pairs = 0;
+  std::uint64_t same = 0;
+  for (std::uint64_t first = stride; first < volume.sample_count(); first += piece.size()) {
+    piece.resize(static_cast<std::size_t>(
+        std::min<std::uint64_t>(volume.sample_count() - first, kWidePieceSamples)));
+    before.resize(piece.size());
+    read_piece(samples, first, piece);
+    read_piece(samples, first - stride, before);
+    std::uint64_t place = first % line;
+    for (std::size_t at = 0; at < piece.size(); ++at) {
+      const bool is_same = piece[at] == before[at];
+      const bool is_pair = place >= stride && !(is_same && piece[at] == background);
+      pairs += is_pair ? 1 : 0;
+      same += is_pair && is_same ? 1 : 0;
+      if (++place == line) place = 0;
+    }
+  }
+  return pairs == 0 ? 1 : static_cast<double>(same) / static_cast<double>(pairs);
+}
+
 // Keeps what the volume's table says of labels that there are.
 template <class Stored>
 std::vector<LabelEntry> entries_of(const std::vector<Stored>& values,
@@ -181,24 +227,18 @@ std::optional<Volume> write(const PlainSamples& samples, Volume volume, const Im
     return std::nullopt;
   }
   const std::vector<Stored>& values = found.all();
+  if (!is_declared && share_of_equal<Stored>(samples, volume) < kFlat) return std::nullopt;
+  if (!std::in_range<std::int64_t>(values.back())) {
+    throw_unusable("The label " + std::to_string(values.back()) +
+                   " is too large: labels up to 9223372036854775807 are read. Number the labels "
+                   "anew and upload them again.");
+  }
   volume.type = values.size() <= std::numeric_limits<std::uint8_t>::max() ? SampleType::kUint8
                                                                           : SampleType::kUint16;
   const auto dims =
       samples.is_segmentation ? with_room(volume.dims, volume.type, task.limits) : volume.dims;
   CanonicalWriter writer(task.target, {dims, volume.type, volume.geometry});
   write_numbers(samples, values, volume, writer.samples().data());
-  put_in_order(writer, volume);
-  const auto numbered =
-      writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
-  if (!is_declared &&
-      volume::share_of_equal_neighbours(numbered, volume.type, volume.dims) < kFlat) {
-    return std::nullopt;
-  }
-  if (!std::in_range<std::int64_t>(values.back())) {
-    throw_unusable("The label " + std::to_string(values.back()) +
-                   " is too large: labels up to 9223372036854775807 are read. Number the labels "
-                   "anew and upload them again.");
-  }
   volume.labels = entries_of(values, volume.labels);
   volume.notes.push_back(renumbered_note(values.size()));
   return finish(writer, std::move(volume), {.is_segmentation = samples.is_segmentation});

@@ -2,7 +2,9 @@
 #include "server/hospital/objects/segmentation.h"
 
 #include <array>
+#include <cstdint>
 #include <cstring>
+#include <fstream>
 #include <set>
 #include <string>
 #include <vector>
@@ -204,6 +206,31 @@ TEST_F(SegmentationTest, OfSlicesAcrossTheFileGoesOnFromWindowToWindow) {
                                                   "1.1.1.1.1.1..1.1.1.1.1.1"));
   }
   EXPECT_EQ(across, 32);
+}
+
+// The bytes that this process has read with system calls.
+std::uint64_t bytes_read() {
+  std::ifstream file("/proc/self/io");
+  std::string name;
+  std::uint64_t bytes = 0;
+  file >> name >> bytes;
+  EXPECT_EQ(name, "rchar:");
+  return bytes;
+}
+
+// Sagittal images: each row of the file has a sample of each slice.
+TEST_F(SegmentationTest, OfSlicesAcrossTheRowsOfTheFileAreFoundInOnePass) {
+  test::SampleVolume<std::uint8_t> labels = {.samples = {}, .dims = {64, 50, 60}, .geometry = {}};
+  for (int n = 0; n < 64 * 50 * 60; ++n) labels.samples.push_back(n % 64 / 16);
+  const auto stored = stored_as(labels, {.axes = {1, 2, 0}, .is_reversed = {}});
+  LabelGrid grid = grid_of(labels.samples, labels.geometry, stored.geometry,
+                           {stored.dims.x, stored.dims.y, stored.dims.z}, {64, 50, 60});
+  ASSERT_EQ(grid.axes[2], 0U);
+  grid.window_bytes = 1;  // a slice
+  const std::uint64_t before = bytes_read();
+  const std::vector<std::int64_t> wanted = {1, 2, 3};
+  EXPECT_EQ(frames_of(grid, wanted, blobs_, {}).size(), 48U);
+  EXPECT_LT(bytes_read() - before, 2 * labels.samples.size());
 }
 
 // They are counted before they are all in memory: noise has most labels in each slice.

@@ -1,6 +1,8 @@
 // One object, stored with its axes in any order and from either end, is one canonical file.
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -11,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/import/samples/wide_labels.h"
 #include "server/volume/geometry.h"
 #include "server/volume/sample_order.h"
 #include "tests/unit/import/archives.h"
@@ -113,6 +116,37 @@ TEST(AxisOrder, OfSamplesThatAreConvertedIsThatOfThePatient) {
   std::vector<float> masks(kCount, 0);
   std::fill(masks.begin() + 20, masks.begin() + 33, 1.0F);
   expect_one_file(masks);
+}
+
+// Regions count along the first axis of the patient. Samples that are no labels are not written
+// before that is known.
+TEST(AxisOrder, OfWideIntegersDoesNotDecideIfTheyAreLabels) {
+  const Folder folder;
+  for (const bool are_flat : {true, false}) {
+    std::vector<std::int64_t> samples;
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 4; ++j) {
+        for (int i = 0; i < 5; ++i) {
+          samples.push_back(std::int64_t{(are_flat ? 3 * k + j : 3 * i + j) % 5 + 1} << 40);
+        }
+      }
+    }
+    for (const AxisOrder& order : kStorages) {
+      const InputFile file(folder.write("samples", bytes_of(in_order(samples, order))));
+      const std::filesystem::path target = folder.path("target");
+      Volume volume;
+      volume.dims = volume::in_order(kDims, order);
+      volume.geometry = volume::in_order(kDims, kPlace, order);
+      SampleLayout layout;
+      layout.type = StoredType::kInt64;
+      ImportTask task;
+      task.target = target;
+      const auto labels = write_wide_labels({.file = file, .layout = layout}, volume, task);
+      EXPECT_EQ(labels.has_value(), are_flat) << volume::to_string(order);
+      EXPECT_EQ(std::filesystem::exists(target), are_flat) << volume::to_string(order);
+      std::filesystem::remove(target);
+    }
+  }
 }
 
 TEST(AxisOrder, InTheFileIsTold) {

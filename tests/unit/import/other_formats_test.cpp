@@ -172,7 +172,7 @@ TEST(Cube, TurnsBohrIntoAngstromAndTheLastAxisRunsFastest) {
   constexpr double kBohr = 0.529177210903;
   const Outcome outcome = imported(import_bytes(cube({.atoms = "1 1 2 3"}, counted(24))));
   EXPECT_EQ(outcome.volume.dims, (Dims{2, 3, 4}));
-  const auto is_nearly = [](double place) { return DoubleNear(place, 1e-6); };
+  const auto is_nearly = [](double place) { return DoubleNear(place, 1e-4 * kBohr); };
   EXPECT_THAT(outcome.volume.geometry.spacing, Each(is_nearly(kBohr)));
   EXPECT_THAT(outcome.volume.geometry.origin,
               ElementsAre(is_nearly(kBohr), is_nearly(2 * kBohr), is_nearly(3 * kBohr)));
