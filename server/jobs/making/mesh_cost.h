@@ -38,7 +38,7 @@ mesh::WalkOptions walk_options(mesh::SmoothOptions smooth, const MeshParameters&
 // in memory.
 bool sets_aside(std::uint64_t samples);
 
-// What takes memory beside a surface.
+// Memory that a job takes beside a surface.
 struct MemoryUse {
   // Labels have two triangles for each of their walls together, or so many, if they overlap.
   std::uint64_t of_labels = 0;

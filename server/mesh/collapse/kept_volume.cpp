@@ -216,7 +216,7 @@ class Mover {
         std::ranges::count_if(triangle.corners, [&](std::uint32_t n) { return is_free(n); }));
   }
 
-  // What its corners owe for a triangle. Its area is measured.
+  // The part of a triangle in what its corners owe. Its area is measured.
   double owed_by(std::size_t triangle) const {
     const double area = length(of_triangles_[triangle]);
     double owed = 0;

@@ -1,4 +1,4 @@
-// What collapses leave of a surface, numbered anew, with the walls at each vertex; private to this
+// A surface as collapses leave it, numbered anew, with the walls at each vertex; private to this
 // folder.
 #pragma once
 
@@ -37,9 +37,9 @@ class LeftSurface {
   }
 
   std::span<const LeftTriangle> triangles() const { return triangles_; }
-  // Of each vertex that is left, the mesh's.
+  // The mesh's vertices that are left, ascending.
   std::span<const std::uint32_t> vertices() const { return left_; }
-  // What a vertex of the mesh has become.
+  // The vertex that a vertex of the mesh has become.
   std::uint32_t kept(std::uint32_t vertex) const { return kept_[vertex]; }
 
   std::size_t slots() const { return slot_walls_.size(); }

@@ -85,7 +85,7 @@ std::vector<std::uint32_t> PartVolumes::to_undo(double share, std::span<const do
   std::ranges::sort(all, [](const Swept& a, const Swept& b) {
     return std::pair(-std::abs(a.volume), a.triangle) < std::pair(-std::abs(b.volume), b.triangle);
   });
-  // What is undone gives the front its volume back, and takes it from the part behind.
+  // An undone triangle gives the front its volume back, and takes it from the part behind.
   const auto give = [](double volume, double& lack) {
     if (!(volume * lack > 0)) return false;
     lack = std::abs(lack) > std::abs(volume) ? lack - volume : 0;

@@ -26,7 +26,7 @@ class PartVolumes {
   std::vector<double> changes(std::span<const Vec3> places, std::span<const Triangle> triangles,
                               std::span<const std::uint32_t> numbers) const;
 
-  // Of each part, whether it has changed by more than a share of its volume.
+  // True, by part, if it has changed by more than a share of its volume.
   std::vector<std::uint8_t> beyond(double share, std::span<const double> changes) const;
 
   // Triangles of the mesh whose collapses and moves have taken most from the parts that lack more

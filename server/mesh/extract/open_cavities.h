@@ -82,7 +82,7 @@ struct CavityCount {
 CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes,
                            const Context& context);
 
-// What bounds the memory of searches.
+// The sizes that bound the memory of searches.
 struct CavitySearches {
   Dims dims;                   // of the largest
   std::uint64_t vertices = 0;  // of the surfaces that are searched at once

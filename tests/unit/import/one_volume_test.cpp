@@ -31,7 +31,7 @@ using isomesh::test::stored_as;
 using Object = SampleVolume<std::uint8_t>;
 using Matrix = std::array<double, 9>;
 
-// Of the unit quaternion.
+// The rotation of a unit quaternion.
 Matrix rotation(const std::array<double, 4>& q) {
   const auto& [a, b, c, d] = q;
   return {

@@ -65,7 +65,7 @@ TEST_F(ChangedVolumeTest, NamesNoWayOutThatIsTaken) {
   EXPECT_THAT(made(parameters_).notes, IsEmpty());
 }
 
-// What simplification changes is not smoothing's, and is bounded otherwise.
+// Simplification changes the volume, too, which is bounded otherwise.
 TEST_F(ChangedVolumeTest, IsThatOfSmoothingAlone) {
   parameters_.passes = 0;
   parameters_.max_error_mm = 1;
