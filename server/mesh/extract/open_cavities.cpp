@@ -418,7 +418,7 @@ std::uint64_t cavity_search_memory(const CavitySearches& searches) {
   const std::uint64_t kept_runs = planes * rows + kKeptPlanes * searches.vertices;
   const std::uint64_t kept = searches.at_once * plane_bytes(planes, kept_runs);
 
-  // A node, and what each takes while they are counted. A start of a region has two vertices beside it.
+  // A node takes this, and that while they are counted. A start of a region has two vertices.
   const std::uint64_t node = sizeof(Node) * (1 + searches.schemes) + sizeof(std::uint64_t) + 1;
   constexpr std::uint64_t kCounted = 2 * sizeof(std::uint64_t) + 1;
   const std::uint64_t nodes = std::min<std::uint64_t>(
