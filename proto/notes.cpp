@@ -178,7 +178,7 @@ constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kVolumeChanged,
      .name = "volume-changed",
      .meaning = "Only of a closed mesh at an iso-value. Smoothing changed its volume by more than "
-                "1 %. The detail says by how much, and which parameters change it less. Thin parts "
+                "5 %. The detail says by how much, and which parameters change it less. Thin parts "
                 "and sharp edges lose the most.",
      .is_of_mesh = true},
 };

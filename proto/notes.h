@@ -40,7 +40,7 @@ enum class NoteCode {
   kChunksMissing,         // Zarr: some chunks are not there; their samples have the fill value
   kOrientationChanged,    // somebody flipped or turned the volume after its upload
   kThinWalls,             // of a mesh: cavities are open because their walls are thin
-  kVolumeChanged,         // of a mesh: smoothing changed its volume by more than 1 %
+  kVolumeChanged,         // of a mesh: smoothing changed its volume by more than 5 %
 };
 
 struct NoteDescription {

@@ -212,7 +212,7 @@ class Client {
   std::vector<LabelSummary> job_labels(const std::string& id);
 
   // The areas where two labels of a finished job touch, or one is next to the background, ascending
-  // by labels; with `edge_contacts` also of pairs that share no face of a voxel. Throws as
+  // by labels; with `edge_contacts`, behind them, of pairs that share no face of a voxel. Throws as
   // job_labels() does.
   std::vector<WallSummary> job_walls(const std::string& id, bool edge_contacts = false);
 

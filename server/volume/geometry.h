@@ -81,7 +81,7 @@ Geometry in_order(const std::array<std::uint32_t, 3>& dims, const Geometry& geom
 //   - of a coordinate of the origin, the largest up to 2e-4 of the smallest spacing.
 // The first two leave the middle of the lattice where it is. So numbers as people choose them stay
 // or are found again, and others are equal unless a border of a grid lies between them. Rounding
-// moves the lattice by at most 1e-4 of the smallest spacing along each axis of the patient, and a
+// moves the lattice by at most 1.1e-4 of the smallest spacing along each axis of the patient, and a
 // sample by at most 5e-7 of its way along the axes from the middle. The result of the result is
 // itself. The geometry must be normalised and free of faults (find_fault).
 Geometry canonical_geometry(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry);

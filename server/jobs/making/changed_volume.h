@@ -9,7 +9,7 @@
 
 namespace isomesh::jobs {
 
-// The note volume-changed, if smoothing changed the volume of the summary by more than 1 %. The
+// The note volume-changed, if smoothing changed the volume of the summary by more than 5 %. The
 // caller says whether the surface encloses one. To be called before simplification, which changes
 // the volume, too.
 std::optional<Note> note_on_changed_volume(const MeshParameters& parameters,

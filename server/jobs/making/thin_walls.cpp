@@ -240,9 +240,18 @@ bool searches_cavities(const SampleArray& samples, const MeshParameters& paramet
   });
 }
 
+namespace {
+
+std::uint64_t vertices_at_work(const mesh::SurfaceSize& surface) {
+  return surface.most_vertices(mesh::kCavityPlanes + 1);
+}
+
+}  // namespace
+
 std::uint64_t cavity_search_memory(const SampleArray& samples, const mesh::SurfaceSize& surface) {
   return mesh::cavity_search_memory({.dims = {samples.dims[0], samples.dims[1], samples.dims[2]},
                                      .vertices = surface.vertices,
+                                     .vertices_at_work = vertices_at_work(surface),
                                      .schemes = kMostOthers});
 }
 
@@ -260,6 +269,7 @@ std::uint64_t cavity_search_memory(const SampleArray& samples,
   return mesh::cavity_search_memory(
       {.dims = largest,
        .vertices = 2 * walls.vertices,
+       .vertices_at_work = 2 * vertices_at_work(walls),
        .schemes = kMostOthers,
        .at_once = std::min<std::uint64_t>(searched.size(),
                                           static_cast<std::uint64_t>(mesh::thread_count()))});

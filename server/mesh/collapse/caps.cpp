@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <functional>
+#include <cstdint>
 #include <utility>
 
 #include "server/mesh/collapse/swept.h"
@@ -23,18 +23,27 @@ constexpr std::size_t kMostPlanes = 64;
 
 Caps::Caps(const Mesh& mesh, std::span<const Triangle> triangles) {
   if (mesh.on_border.empty()) return;
+  const SurfaceView view = {mesh.positions, triangles};
+  struct Candidate {
+    double area;  // twice
+    std::uint32_t triangle;
+  };
   // Those of large triangles come first, because bevelled edges have many small ones.
-  std::vector<std::pair<double, Corners>> found;
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
+  std::vector<Candidate> candidates;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     const bool is_on_border =
         std::ranges::all_of(triangles[t], [&](std::uint32_t v) { return mesh.is_on_border(v); });
     if (!is_on_border) continue;
-    const Corners corners = corners_of({mesh.positions, triangles}, t);
-    found.emplace_back(length(normal_of(corners[0], corners[1], corners[2])), corners);
+    const Corners corners = corners_of(view, t);
+    candidates.push_back({length(normal_of(corners[0], corners[1], corners[2])), t});
   }
-  std::ranges::stable_sort(found, std::greater(), [](const auto& each) { return each.first; });
-  for (const auto& [area, corners] : found) {
+  std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
+    return std::pair(-a.area, a.triangle) < std::pair(-b.area, b.triangle);
+  });
+  std::size_t in_front = 0;  // the last vertex that was; many planes have the same one
+  for (const auto& [area, triangle] : candidates) {
     if (planes_.size() == kMostPlanes) return;
+    const Corners corners = corners_of(view, triangle);
     const Point edge = minus(corners[1], corners[0]);
     if (!(area > kLeastShape * dot(edge, edge))) continue;
     const Point unit = scaled(normal_of(corners[0], corners[1], corners[2]), 1 / area);
@@ -44,15 +53,20 @@ Caps::Caps(const Mesh& mesh, std::span<const Triangle> triangles) {
       return dot(other.normal, unit) > kLeastCosine &&
              std::abs(other.offset - plane.offset) < depth;
     });
-    if (!is_known && is_behind(mesh, plane, depth)) planes_.push_back(plane);
+    if (!is_known && is_behind(mesh, plane, depth, in_front)) planes_.push_back(plane);
   }
 }
 
 // A triangle at an edge of the box may lie across a part of the surface.
-bool Caps::is_behind(const Mesh& mesh, const Plane& plane, double depth) {
-  return std::ranges::all_of(mesh.positions, [&](const Vec3& position) {
-    return dot(plane.normal, to_point(position)) - plane.offset < depth;
-  });
+bool Caps::is_behind(const Mesh& mesh, const Plane& plane, double depth, std::size_t& in_front) {
+  const auto is_in_front = [&](const Vec3& position) {
+    return !(dot(plane.normal, to_point(position)) - plane.offset < depth);
+  };
+  if (is_in_front(mesh.positions[in_front])) return false;
+  const auto found = std::ranges::find_if(mesh.positions, is_in_front);
+  if (found == mesh.positions.end()) return true;
+  in_front = static_cast<std::size_t>(found - mesh.positions.begin());
+  return false;
 }
 
 double Caps::share_of_way(const Point& place, const Point& way) const {

@@ -1,6 +1,7 @@
 // The caps of a closed surface, which nothing crosses; private to this folder.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,7 @@ class Caps {
     double offset = 0;
   };
 
-  static bool is_behind(const Mesh& mesh, const Plane& plane, double depth);
+  static bool is_behind(const Mesh& mesh, const Plane& plane, double depth, std::size_t& in_front);
 
   std::vector<Plane> planes_;
 };

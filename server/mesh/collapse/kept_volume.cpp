@@ -72,9 +72,7 @@ class Mover {
       }
       if (!straighten()) break;
     }
-    for (std::size_t n = 0; n < vertices(); ++n) {
-      if (way_[n] != Point{0, 0, 0}) places[left_.vertices()[n]] = rounded(place(n));
-    }
+    for (std::size_t n = 0; n < vertices(); ++n) places[left_.vertices()[n]] = rounded(place(n));
   }
 
  private:

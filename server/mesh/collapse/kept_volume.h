@@ -24,12 +24,12 @@ inline constexpr double kLeastCosineOfMoves = 0.5;
 
 // Moves vertices of the mesh, whose collapses are in `history`, from these places. Those that are
 // gone, on a cap, or at the end of an open surface and beside it stay, as do those of junction
-// curves without `sides`, and those that are held. `is_held`: of each vertex; empty if none is.
-// None moves across a cap. No other is farther than `most_mm` from its own place, nor than half the
-// length of its shortest edge, and no triangle turns farther than kLeastCosineOfMoves or loses its
-// area. `sides`: of the mesh's triangles, empty if all are of one wall. Each wall keeps the volume
-// on its sides, as far as these limits allow. The same for any number of threads. Throws Error
-// kCancelled.
+// curves without `sides`. `is_held`: of each vertex, whether it only moves back, where a triangle
+// turns; empty if none is. None moves across a cap. No other goes farther than `most_mm` from its
+// own place, nor than half the length of its shortest edge, and no triangle turns farther than
+// kLeastCosineOfMoves or loses its area. `sides`: of the mesh's triangles, empty if all are of one
+// wall. Each wall keeps the volume on its sides, as far as these limits allow. The same for any
+// number of threads. Throws Error kCancelled, and kTooLarge if 32 bits cannot number all corners.
 void keep_volume(const Mesh& mesh, std::span<const WallSides> sides, const History& history,
                  std::span<const std::uint8_t> is_held, double most_mm, const Context& context,
                  std::vector<Vec3>& places);

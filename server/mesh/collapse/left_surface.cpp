@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <numeric>
+#include <string>
 
 #include "server/mesh/parallel.h"
 
@@ -106,6 +107,11 @@ void LeftSurface::make_slots() {
 }
 
 void LeftSurface::find_corners() {
+  if (triangles_.size() > kNone / 3) {
+    throw Error(ErrorCode::kTooLarge,
+                "the simplified surface has " + std::to_string(triangles_.size()) +
+                    " triangles; more than 32 bits can number the corners of");
+  }
   first_corner_.assign(slot_walls_.size() + 1, 0);
   for (const LeftTriangle& triangle : triangles_) {
     for (const std::uint32_t slot : triangle.slots) ++first_corner_[slot];

@@ -26,7 +26,8 @@ class LeftSurface {
     Triangle slots;
   };
 
-  // `sides`: of the mesh's triangles, empty if all are of one wall. Throws Error kCancelled.
+  // `sides`: of the mesh's triangles, empty if all are of one wall. Throws Error kCancelled,
+  // and kTooLarge if 32 bits cannot number the corners.
   LeftSurface(const Mesh& mesh, std::span<const WallSides> sides, const History& history,
               const Context& context);
 

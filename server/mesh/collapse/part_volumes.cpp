@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 #include "server/mesh/collapse/swept.h"
@@ -26,6 +27,29 @@ PartVolumes::PartVolumes(const Mesh& mesh, std::span<const WallSides> sides) : s
     if (counts[part] > 0) middles_[part] = scaled(middles_[part], 1 / counts[part]);
   }
   volumes_ = volumes(mesh, [&](std::size_t t) { return sides[t]; });
+  find_sizes(mesh);
+}
+
+// The areas around a closed part cancel each other. The cones of an open one may, too, so a share
+// of the ball with its area is the least that counts.
+void PartVolumes::find_sizes(const Mesh& mesh) {
+  constexpr double kOpen = 1e-3;           // of the area
+  constexpr double kLeastRoundness = 0.1;  // of the volume of the ball
+  std::vector<Point> sums(volumes_.size(), Point{0, 0, 0});
+  std::vector<double> areas(volumes_.size(), 0);
+  for (std::size_t t = 0; t < sides_.size(); ++t) {
+    const Corners corners = corners_of(mesh, t);
+    const Point area = scaled(normal_of(corners[0], corners[1], corners[2]), 0.5);
+    sums[sides_[t].back] = plus(sums[sides_[t].back], area);
+    sums[sides_[t].front] = minus(sums[sides_[t].front], area);
+    for (const PartNumber part : {sides_[t].front, sides_[t].back}) areas[part] += length(area);
+  }
+  sizes_ = volumes_;
+  for (std::size_t part = 0; part < sizes_.size(); ++part) {
+    const double ball = std::pow(areas[part], 1.5) / (6 * std::sqrt(std::numbers::pi));
+    const bool is_open = length(sums[part]) > kOpen * areas[part];
+    sizes_[part] = std::max(std::abs(sizes_[part]), is_open ? kLeastRoundness * ball : 0);
+  }
 }
 
 // Counter-clockwise from the front, so behind a triangle it counts.
@@ -55,7 +79,7 @@ std::vector<double> PartVolumes::changes(std::span<const Vec3> places,
 std::vector<std::uint8_t> PartVolumes::beyond(double share, std::span<const double> changes) const {
   std::vector<std::uint8_t> are_beyond(changes.size(), 0);
   for (std::size_t part = 1; part < changes.size(); ++part) {
-    const bool is_beyond = std::abs(changes[part]) > share * std::abs(volumes_[part]);
+    const bool is_beyond = std::abs(changes[part]) > share * sizes_[part];
     are_beyond[part] = is_beyond ? 1 : 0;
   }
   return are_beyond;
@@ -77,6 +101,7 @@ std::vector<std::uint32_t> PartVolumes::to_undo(double share, std::span<const do
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (lacking[sides_[t].front] == 0 && lacking[sides_[t].back] == 0) continue;
     const Triangle kept = history.corners_of(mesh.triangles[t]);
+    if (kept == mesh.triangles[t]) continue;  // nothing to undo
     Corners to;
     for (std::size_t i = 0; i < 3; ++i) to[i] = to_point(places[kept[i]]);
     const auto [a, b, c] = swept(corners_of(mesh, t), to);

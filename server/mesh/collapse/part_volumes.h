@@ -14,8 +14,9 @@ namespace isomesh::mesh::collapse {
 
 // The volume of each part (label_parts.h) with walls around it, but the background. A part that is
 // open at the border of the volume has that of the cones from the middle of its walls, whose
-// changes are right because the ends stay. All have 0 where there are no walls. Immutable, so safe
-// to read from several threads.
+// changes are right because the ends stay; shares of it are of a tenth of the ball with the same
+// area at least. All have 0 where there are no walls. Immutable, so safe to read from several
+// threads.
 class PartVolumes {
  public:
   // `sides`: of the mesh's triangles, empty if all are of one wall.
@@ -37,11 +38,13 @@ class PartVolumes {
                                      std::span<const Vec3> places) const;
 
  private:
+  void find_sizes(const Mesh& mesh);
   template <class Sides>
   std::vector<double> volumes(const SurfaceView& view, Sides sides_of) const;
 
   std::span<const WallSides> sides_;
   std::vector<Point> middles_;   // of each part
+  std::vector<double> sizes_;    // that shares are of
   std::vector<double> volumes_;  // cubic millimetres
 };
 

@@ -30,9 +30,9 @@ struct SimplifyOptions {
   // Target triangle count. 0: as few as the error allows.
   std::uint64_t triangles = 0;
   // Vertices that are left move so that the surface keeps its volume. Of walls, each part
-  // (label_parts.h) keeps 99.7 % of its own, if a target count leaves enough triangles for it and
-  // ten rounds of repairs suffice. False: they stay where they are, so all places are those of the
-  // surface as it was.
+  // (label_parts.h) keeps 99.7 % of its own, if that takes no more triangles than a target count,
+  // or than a fourth more without one, and ten further rounds of repairs suffice. False: they stay
+  // where they are, so all places are those of the surface as it was.
   bool keeps_volume = true;
 };
 

@@ -23,11 +23,12 @@ namespace {
 constexpr int kMostRepairs = 24;
 constexpr int kMostMoves = 6;  // rounds that only move vertices back
 constexpr int kMostProposals = 4;
-// A part's volume changes by no larger share, if that can be reached in so many rounds. The first
-// ones undo nothing.
+// A part's volume changes by no larger share, if that can be reached in so many further rounds and
+// with so few more triangles, a fourth. The first rounds undo nothing.
 constexpr double kMostChange = 0.003;
 constexpr int kMostRestorations = 10;
 constexpr int kMovesAlone = 2;
+constexpr std::size_t kMostRestored = 4;
 
 bool is_left(const Triangle& corners) {
   return corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0];
@@ -109,7 +110,9 @@ class Checker {
     for (std::size_t n = 0; n < proposal.numbers.size(); ++n) {
       corners[proposal.numbers[n]] = proposal.triangles[n];
     }
+    const bool is_new = corners_.empty();
     const auto is_same = [&](std::uint32_t t) {
+      if (!is_left(corners[t]) && !is_left(corners_[t])) return true;
       return corners[t] == corners_[t] && std::ranges::all_of(corners[t], [&](std::uint32_t v) {
                return proposal.places[v] == places_[v];
              });
@@ -117,8 +120,8 @@ class Checker {
     fresh_ = std::exchange(faults_, {});
     std::vector<Box> changed;
     for (std::uint32_t t = 0; t < corners.size(); ++t) {
-      if (!corners_.empty() && is_same(t)) continue;
-      if (!corners_.empty()) note_box(t, changed);
+      if (is_new || is_same(t)) continue;
+      note_box(t, changed);
       fresh_.push_back(t);
     }
     corners_ = std::move(corners);
@@ -126,7 +129,7 @@ class Checker {
     pulls_.assign(places_.size(), 0);
     for (const std::uint32_t t : fresh_) note_box(t, changed);
     make_fresh_a_set();
-    is_first_ = 2 * fresh_.size() > proposal.numbers.size();
+    is_first_ = is_new || 2 * fresh_.size() > proposal.numbers.size();
     if (is_first_) {
       fresh_ = proposal.numbers;
       std::ranges::sort(fresh_);
@@ -319,24 +322,38 @@ void undo(std::span<const std::uint32_t> which, const Mesh& mesh, Proposal& prop
 }
 
 // Moves vertices so that the surface keeps its volume, and repairs what that spoils. What repairs
-// take from a part is given back by the other vertices beside it, and then by undone collapses.
-// Returns true if all points are within the error.
+// take from a part is given back by the other vertices beside it, and then by undone collapses, if
+// these leave few more triangles and no more than asked for. Returns true if all points are within
+// the error.
 bool move_and_repair(const SimplifyOptions& options, const Context& context,
                      const WalledSurface& surface, const Mesh& mesh,
                      const collapse::PartVolumes& volumes, Checker& checker, Proposal& proposal) {
   proposal.places.assign(mesh.positions.begin(), mesh.positions.end());
   if (!options.keeps_volume) return checker.repair(proposal);
   std::vector<std::uint8_t> is_held;
+  std::size_t most = 0;  // triangles
+  Proposal before;
+  bool is_within_before = false;
   for (int round = 0;; ++round) {
     collapse::keep_volume(mesh, surface.sides, proposal.history, is_held, options.max_error_mm,
                           context, proposal.places);
     const bool is_within = checker.repair(proposal);
+    const std::size_t count = proposal.triangles.size();
+    if (round == kMovesAlone) {
+      most = options.triangles > 0 ? std::max<std::size_t>(count, options.triangles)
+                                   : count + count / kMostRestored;
+    } else if (round > kMovesAlone && count > most) {
+      proposal = std::move(before);
+      return is_within_before;
+    }
     const std::vector<double> changes =
         volumes.changes(proposal.places, proposal.triangles, proposal.numbers);
     const std::vector<std::uint8_t> are_changed = volumes.beyond(kMostChange, changes);
     const bool is_any = std::ranges::find(are_changed, 1) != are_changed.end();
     if (!is_any || round == kMostRestorations) return is_within;
     if (round >= kMovesAlone) {
+      before = proposal;
+      is_within_before = is_within;
       undo(volumes.to_undo(kMostChange, changes, mesh, proposal.history, proposal.places), mesh,
            proposal);
     }

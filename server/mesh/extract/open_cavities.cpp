@@ -400,29 +400,29 @@ CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes
 std::uint64_t cavity_search_memory(const CavitySearches& searches) {
   constexpr std::uint64_t kGrown = 2;       // arrays have room to grow
   constexpr std::uint64_t kKeptPlanes = 4;  // of a slab, those of centres included
-  constexpr std::uint64_t kPlanesAtWork = 6;
   const Dims& dims = searches.dims;
   const std::uint64_t rows = dims.y;
   const std::uint64_t most_runs = rows * (dims.x / 2 + 1);
-  const auto plane_bytes = [&](std::uint64_t planes, std::uint64_t runs) {
-    return planes * rows * sizeof(std::size_t) + std::min(planes * most_runs, runs) * sizeof(Run);
+  const auto bytes = [&](std::uint64_t planes, std::uint64_t vertices) {
+    // A row has a run more than pairs of vertices.
+    const std::uint64_t runs = std::min(planes * most_runs, planes * rows + vertices);
+    return planes * rows * sizeof(std::size_t) + runs * sizeof(Run);
   };
 
-  // A row has a run more than pairs of vertices. The planes that two slabs share are kept twice.
-  const std::uint64_t runs_at_work = kPlanesAtWork * (rows + searches.vertices);
   const std::uint64_t signs = kGrown * rows * chunks_of(dims.x, kWordBits) * sizeof(Word);
-  const std::uint64_t of_threads = static_cast<std::uint64_t>(thread_count()) *
-                                   (kGrown * plane_bytes(kPlanesAtWork, runs_at_work) + signs);
+  const std::uint64_t of_threads =
+      static_cast<std::uint64_t>(thread_count()) *
+      (kGrown * bytes(kCavityPlanes, kCavityPlanes * searches.vertices_at_work) + signs);
 
-  const std::uint64_t planes = kKeptPlanes * chunks_of(dims.z, kSlabPlanes);
-  const std::uint64_t kept_runs = planes * rows + kKeptPlanes * searches.vertices;
-  const std::uint64_t kept = searches.at_once * plane_bytes(planes, kept_runs);
+  // The planes that two slabs share are kept twice.
+  const std::uint64_t planes = searches.at_once * kKeptPlanes * chunks_of(dims.z, kSlabPlanes);
+  const std::uint64_t kept = bytes(planes, kKeptPlanes * searches.vertices);
 
   // A node takes this, and that while they are counted. A start of a region has two vertices.
   const std::uint64_t node = sizeof(Node) * (1 + searches.schemes) + sizeof(std::uint64_t) + 1;
   constexpr std::uint64_t kCounted = 2 * sizeof(std::uint64_t) + 1;
-  const std::uint64_t nodes = std::min<std::uint64_t>(
-      searches.at_once * kMostRegionStarts, searches.at_once * planes + searches.vertices);
+  const std::uint64_t nodes =
+      std::min<std::uint64_t>(searches.at_once * kMostRegionStarts, planes + searches.vertices);
   return of_threads + std::min<std::uint64_t>(kept, searches.at_once * kMostRunBytes) +
          nodes * (kGrown * node + sizeof(std::uint64_t) + kCounted);
 }

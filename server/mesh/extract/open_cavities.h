@@ -82,10 +82,15 @@ struct CavityCount {
 CavityCount count_cavities(const SignRows& rows, std::span<const Scheme> schemes,
                            const Context& context);
 
+// The planes that a thread has at a time.
+inline constexpr std::uint64_t kCavityPlanes = 6;
+
 // The sizes that bound the memory of searches.
 struct CavitySearches {
   Dims dims;                   // of the largest
-  std::uint64_t vertices = 0;  // of the surfaces that are searched at once
+  std::uint64_t vertices = 0;  // of all surfaces
+  // The most in kCavityPlanes planes that follow each other, and the one behind them.
+  std::uint64_t vertices_at_work = 0;
   std::size_t schemes = 1;
   std::uint64_t at_once = 1;  // searches
 };

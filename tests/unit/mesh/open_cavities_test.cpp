@@ -430,11 +430,14 @@ TEST(OpenCavities, TakeNoMoreMemoryThanIsEstimated) {
   const auto expect_enough = [](const test::SampleVolume<std::uint8_t>& volume) {
     const Lattice<std::uint8_t> lattice = volume.lattice();
     const ExtractOptions options = {.iso = kIso, .regularize = true};
-    const std::uint64_t vertices = count_surface(lattice, options, {}).vertices();
+    const SurfaceSize size = size_of(count_surface(lattice, options, {}));
     test::HeapPeak peak;
     count_cavities(sign_rows(lattice, options), test::kSchemes, {});
-    const std::uint64_t estimated = cavity_search_memory(
-        {.dims = lattice.dims, .vertices = vertices, .schemes = test::kSchemes.size()});
+    const std::uint64_t estimated =
+        cavity_search_memory({.dims = lattice.dims,
+                              .vertices = size.vertices,
+                              .vertices_at_work = size.most_vertices(kCavityPlanes + 1),
+                              .schemes = test::kSchemes.size()});
     EXPECT_GE(estimated, peak.bytes());
     return estimated;
   };
@@ -442,6 +445,19 @@ TEST(OpenCavities, TakeNoMoreMemoryThanIsEstimated) {
   expect_enough(test::noise<std::uint8_t>({0, 1, 1, 1, 1}, {130, 100, 110}, 8));
   expect_enough(test::noise<std::uint8_t>({0, 0, 1}, {600, 500, 2}, 9));
   EXPECT_LT(expect_enough(shell(1.5, kOffCentre)), std::uint64_t{1} << 20);
+}
+
+// Labels that are searched at once share the vertices.
+TEST(OpenCavities, TakeLittleMoreOnManyThreads) {
+  const auto estimated = [](int count) {
+    const test::ThreadCount threads(count);
+    return cavity_search_memory({.dims = {512, 512, 512},
+                                 .vertices = 4'000'000,
+                                 .vertices_at_work = 100'000,
+                                 .schemes = test::kSchemes.size(),
+                                 .at_once = static_cast<std::uint64_t>(count)});
+  };
+  EXPECT_LT(estimated(16), 2 * estimated(2));
 }
 
 TEST(OpenCavities, StopWhenTheyAreCancelled) {

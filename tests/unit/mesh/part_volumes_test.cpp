@@ -72,7 +72,7 @@ TEST(PartVolumes, OfOpenPartsChangeAsThoseOfClosedOnes) {
   EXPECT_GT(largest, 0.1);
 }
 
-// One vertex was drawn into the label, and another one much farther out of it.
+// One vertex was drawn through the label, and another one moved out of it without a collapse.
 TEST(PartVolumes, ComeBackWhereTheyWereLost) {
   auto volume = test::constant<std::uint8_t>(0, {14, 14, 14});
   for (std::uint32_t k = 4; k < 10; ++k) {
@@ -82,28 +82,34 @@ TEST(PartVolumes, ComeBackWhereTheyWereLost) {
   }
   const SeparatingSurface box = separated(volume, {.labels = {1}, .close = true});
   const PartVolumes volumes(box.mesh, box.sides.span());
-  std::vector<Vec3> places(box.mesh.positions.begin(), box.mesh.positions.end());
-  const auto vertex_at = [&](float x) {
+  const auto vertex_at = [&](float x, float y) {
     const auto found = std::ranges::find_if(box.mesh.positions, [&](const Vec3& p) {
-      return p[0] == x && std::abs(p[1] - 7) < 1 && std::abs(p[2] - 7) < 1;
+      return p[0] == x && p[1] == y && std::abs(p[2] - 7) < 1;
     });
     return static_cast<std::uint32_t>(found - box.mesh.positions.begin());
   };
-  const std::uint32_t drawn_in = vertex_at(9.5F);
-  const std::uint32_t pushed_in = vertex_at(3.5F);
-  ASSERT_LT(std::max(drawn_in, pushed_in), places.size());
-  places[drawn_in][0] -= 2;
-  places[pushed_in][0] -= 0.5F;
-  const std::vector<double> changes = volumes.changes(
-      places, box.mesh.triangles.span(), consecutive<std::uint32_t>(0, box.sides.size()));
-  EXPECT_LT(changes[1], -0.3);
-  const History none(places.size());
-  const std::vector<std::uint32_t> which = volumes.to_undo(1e-3, changes, box.mesh, none, places);
+  const std::uint32_t drawn = vertex_at(9.5F, 7);
+  const std::uint32_t into = vertex_at(3.5F, 7);
+  const std::uint32_t moved = vertex_at(3.5F, 5);
+  ASSERT_LT(std::max({drawn, into, moved}), box.mesh.positions.size());
+  std::vector<Vec3> places(box.mesh.positions.begin(), box.mesh.positions.end());
+  places[moved][0] -= 0.5F;
+  History history(places.size());
+  history.add({drawn, into, 0});
+  std::vector<Triangle> triangles;
+  for (const Triangle& triangle : box.mesh.triangles) {
+    triangles.push_back(history.corners_of(triangle));
+  }
+  const std::vector<double> changes =
+      volumes.changes(places, triangles, consecutive<std::uint32_t>(0, box.sides.size()));
+  EXPECT_LT(changes[1], -1);
+  const std::vector<std::uint32_t> which =
+      volumes.to_undo(1e-3, changes, box.mesh, history, places);
   EXPECT_FALSE(which.empty());
   for (const std::uint32_t t : which) {
-    EXPECT_TRUE(std::ranges::find(box.mesh.triangles[t], drawn_in) != box.mesh.triangles[t].end());
+    EXPECT_TRUE(std::ranges::find(box.mesh.triangles[t], drawn) != box.mesh.triangles[t].end());
   }
-  EXPECT_TRUE(volumes.to_undo(0.5, changes, box.mesh, none, places).empty());
+  EXPECT_TRUE(volumes.to_undo(0.5, changes, box.mesh, history, places).empty());
 }
 
 // A block that fills the volume. A triangle between three faces is none of a cap.

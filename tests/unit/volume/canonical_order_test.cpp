@@ -202,7 +202,7 @@ TEST(CanonicalOrder, LeavesTheCornersOfALatticeInTheirPlaces) {
     const Dims dims = in_order(kDims, order);
     double way = 0;  // from the middle to a corner, along the axes
     for (std::size_t axis = 0; axis < 3; ++axis) way += after.spacing[axis] * (dims[axis] - 1) / 2;
-    const double most = 1.001e-4 * std::ranges::min(after.spacing) + 5e-7 * way;
+    const double most = 1.1e-4 * std::ranges::min(after.spacing) + 5e-7 * way;
     for (unsigned corner = 0; corner < 8; ++corner) {
       Vector3 between = {};
       for (std::size_t row = 0; row < 3; ++row)

@@ -313,7 +313,7 @@ class Client(Batches):
 
     def job_walls(self, job: Union[str, AnyJob], *, edge_contacts: bool = False) -> List[api.WallSummary]:
         """The areas where two labels of a succeeded job touch, or one is next to the background, whose `b` is None. In
-        ascending order of labels. With `edge_contacts` also those of pairs that share no face of a voxel."""
+        ascending order of labels. With `edge_contacts`, behind them, those of pairs that share no face of a voxel."""
         query = {"edge_contacts": "true"} if edge_contacts else {}
         return cast("List[api.WallSummary]", list(self._exchange.pages(f"{_job_path(job)}/walls", "walls", answers.WALL, query)))
 
