@@ -26,8 +26,14 @@ class Caps {
     Point normal;
     double offset = 0;
   };
+  // How far a plane may be off, by the way from a place of it.
+  struct Slope {
+    Point from;
+    double rise = 0;
+  };
 
-  static bool is_behind(const Mesh& mesh, const Plane& plane, double depth, std::size_t& in_front);
+  static bool is_behind(const Mesh& mesh, const Plane& plane, double depth, const Slope& slope,
+                        std::size_t& in_front);
 
   std::vector<Plane> planes_;
 };

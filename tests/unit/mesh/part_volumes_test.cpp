@@ -2,6 +2,7 @@
 #include "server/mesh/collapse/part_volumes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -9,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/collapse/caps.h"
+#include "server/mesh/collapse/swept.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh::collapse {
@@ -133,6 +135,29 @@ TEST(Caps, AreThePlanesThatTheSurfaceEndsIn) {
   EXPECT_NEAR(caps.share_of_way({6, 4, 4}, {3, 0, 0}), 0.25, 1e-6);  // half-way to 7.5
   EXPECT_EQ(caps.share_of_way({6, 4, 4}, {0.5, 0, 0}), 1);
   EXPECT_EQ(caps.share_of_way({6, 4, 4}, {-3, 0, 0}), 1);
+}
+
+// Positions far from the origin are rounded, so small triangles hardly tell their plane.
+TEST(Caps, AreFoundWhereverTheSurfaceLies) {
+  SeparatingSurface block =
+      separated(test::constant<std::uint8_t>(1, {60, 50, 40}), {.labels = {1}, .close = true});
+  const auto turned = [](const Point& p) {
+    const double x = 0.8 * p[0] - 0.6 * p[1];
+    const double y = 0.6 * p[0] + 0.8 * p[1];
+    return Point{x, 0.96 * y - 0.28 * p[2], 0.28 * y + 0.96 * p[2]};
+  };
+  const Point away = {700, -900, 1100};
+  for (Vec3& place : block.mesh.positions) {
+    place = rounded(plus(turned(to_point(place)), away));
+  }
+  const Caps caps(block.mesh, block.mesh.triangles.span());
+  const Point place = plus(turned({30, 25, 20}), away);
+  const std::array<Point, 6> ways = {
+      {{118, 0, 0}, {-122, 0, 0}, {0, 98, 0}, {0, -102, 0}, {0, 0, 78}, {0, 0, -82}}};
+  for (const Point& way : ways) {
+    EXPECT_NEAR(caps.share_of_way(place, turned(way)), 0.125, 1e-4)
+        << way[0] << " " << way[1] << " " << way[2];
+  }
 }
 
 TEST(Caps, AreNoneOfAnOpenSurface) {
