@@ -26,7 +26,7 @@ class Caps {
     Point normal;
     double offset = 0;
   };
-  // How far a plane may be off, by the way from a place of it.
+  // The error of a plane, by the way from a place of it.
   struct Slope {
     Point from;
     double rise = 0;
